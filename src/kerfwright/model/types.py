@@ -1,8 +1,8 @@
 """The model: boards, how they meet, and what is known about both.
 
-Frames: *model* is right-handed, millimetres, +z up, the floor at z = 0. *board* has the sheet planes z = 0 ("bottom") and
-z = thickness ("top"), +x along the longest straight edge. Transforms are named target_from_source and are 4x4, row-major:
-x_in_model = model_from_board @ x_in_board.
+Frames: *model* is right-handed, millimetres, +z up, the floor at z = 0. *board* has the sheet planes z = 0 ("bottom")
+and z = thickness ("top"), +x along the longest straight edge. Transforms are named target_from_source and are 4x4,
+row-major: x_in_model = model_from_board @ x_in_board.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ FORMAT_VERSION = 1
 class Bevel(Frozen):
     """A slanted cut face.
 
-    The cut path is the outline of the board before bevelling (its largest extent over the thickness). Along the straight stretch
-    start-end of the outer loop, what lies beyond the plane through `point` with outward `normal` (board frame) is cut away. Two
-    bevels on one stretch make a pointed end.
+    The cut path is the outline of the board before bevelling (its largest extent over the thickness). Along the
+    straight stretch start-end of the outer loop, what lies beyond the plane through `point` with outward `normal`
+    (board frame) is cut away. Two bevels on one stretch make a pointed end.
     """
 
     start: tuple[float, float]
     end: tuple[float, float]
     point: Point3
     normal: Point3
-    angle: Quantity  # degrees between the cut face and a square cut; positive leans the face so that the top is the shorter side
+    angle: Quantity  # degrees between the cut face and a square cut; positive: the top is the shorter side
     contact: int | None = None  # index in Model.contacts
 
 
@@ -73,8 +73,8 @@ class ContactEvidence(Frozen):
 class Contact(Frozen):
     """Two boards touching (paper, Connections; types 1 to 4).
 
-    Type 1: a cut face of `b` on a sheet plane of `a`, and only `b` could end there. Type 2: the same at a corner where either could.
-    Type 3: sheet on sheet. Type 4: cut on cut. The plane's normal points from `a` to `b`, model frame.
+    Type 1: a cut face of `b` on a sheet plane of `a`, and only `b` could end there. Type 2: the same at a corner where
+    either could. Type 3: sheet on sheet. Type 4: cut on cut. The plane's normal points from `a` to `b`, model frame.
     """
 
     type: Literal[1, 2, 3, 4]
