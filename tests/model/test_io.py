@@ -127,7 +127,7 @@ HOSTILE = {
     "same name": (lambda: broken(lambda d: d["boards"][1].update(name="Leg")), "boards[1].name: 'Leg'"),
     "no such board": (lambda: broken(lambda d: d["contacts"][0].update(b="seat")), "contacts[0].b: 'seat'"),
     "no such contact": (lambda: broken(lambda d: d["boards"][0]["bevels"][0].update(contact=7)), "[0].contact: 7"),
-    "sheared pose": (lambda: first(model_from_board=[[1, 0.5, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]), "shears"),
+    "sheared pose": (lambda: broken(lambda d: d["boards"][0]["model_from_board"][0].__setitem__(1, 0.5)), "shears"),
 }  # fmt: skip
 
 
