@@ -1,0 +1,130 @@
+"""`kerfwright reconstruct`: from a capture to a checked model."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from kerfwright.cli import guarded
+from kerfwright.errors import OptionError
+from kerfwright.output import OutputFolder
+from kerfwright.pipeline import ReconstructOptions
+from kerfwright.progress import Reporter, reporter_for
+from kerfwright.supervise import supervised
+
+if TYPE_CHECKING:
+    from kerfwright.model import Finding
+
+__all__ = ["reconstruct", "run_reconstruct"]
+
+_UP = ("x", "y", "z", "-x", "-y", "-z")
+# Read by the numeric libraries when they are first imported.
+_THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+Out = Annotated[Path, typer.Option("-o", "--out", metavar="OUT", help="Folder for the results; made if need be.")]
+Up = Annotated[str, typer.Option("--up", metavar="AXIS", help="Axis of the capture that is up: x, y, z, -x, -y, -z.")]
+ScaleMm = Annotated[
+    float | None,
+    typer.Option("--scale", metavar="MM", help="Millimetres a capture unit. If not said, a unit is a metre."),
+]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Of the random generator; the same seed, the same files.")]
+Jobs = Annotated[
+    int | None, typer.Option("-j", "--jobs", min=1, help="Threads; all cores if not said. The results are the same.")
+]
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing but errors.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Progress as one JSON object a line, on standard output.")]
+Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more.")]
+
+
+def reconstruct(
+    capture: Annotated[Path, typer.Argument(metavar="CAPTURE", help="Folder with images, cameras and a cloud.")],
+    out: Out,
+    up: Up = "z",
+    scale: ScaleMm = None,
+    seed: Seed = 0,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+    verbose: Verbose = False,
+) -> None:
+    """Reconstruct the boards of CAPTURE: a STEP assembly, a DXF file a board, the model and a report."""
+    options = ReconstructOptions(up=_axis(up), millimetres_per_unit=_positive(scale), seed=seed)
+    _limit_threads(jobs)
+    reporter = reporter_for(sys.stdout if as_json else sys.stderr, quiet=quiet, as_json=as_json, verbose=verbose)
+    farewell = f"Results in {out}: open model.step in FreeCAD or any CAD program, parts/*.dxf at the router."
+    raise typer.Exit(run_reconstruct(capture, out, options, reporter, "" if quiet or as_json else farewell))
+
+
+def run_reconstruct(
+    capture: Path, out: Path, options: ReconstructOptions, reporter: Reporter, farewell: str = ""
+) -> int:
+    """Reconstruct into a folder, in a child process, and say the farewell when it is done; returns the exit code."""
+
+    def work() -> int:
+        found = _reconstruct_into(folder, capture, options, reporter)
+        if farewell:
+            typer.echo(farewell)
+        return _verdict(found)
+
+    with OutputFolder(out).claimed() as folder:
+        code = supervised(lambda: guarded(work))
+    if code > 128:
+        sys.stderr.write("\x1b[?25h" if sys.stderr.isatty() else "")  # the child may have hidden the cursor
+        typer.echo(f"kerfwright: {_ending(code)}", err=True)
+    return code
+
+
+def _reconstruct_into(
+    folder: OutputFolder, capture: Path, options: ReconstructOptions, reporter: Reporter
+) -> tuple[Finding, ...]:
+    from kerfwright import pipeline
+    from kerfwright.results import write_results, write_run
+
+    def fill(partial: Path) -> None:
+        with reporter.stage("write", "Writing the results"):
+            write_results(found.model, partial)
+        write_run(reporter, partial / "run.json")
+
+    found = pipeline.reconstruct(capture, options, reporter)
+    folder.write(fill)
+    return found.model.findings
+
+
+def _verdict(findings: tuple[Finding, ...]) -> int:
+    """Say what the checker found wrong; 1 when it forbids cutting."""
+    errors = [f for f in findings if f.severity == "error"]
+    for finding in errors:
+        typer.echo(f"kerfwright: {finding.code}: {finding.message}: {finding.remedy}", err=True)
+    return 1 if errors else 0
+
+
+def _ending(code: int) -> str:
+    import signal
+
+    number = code - 128
+    if number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        return "interrupted; the output folder is as it was"
+    if number == signal.SIGKILL:
+        return "error: the system ended it, most likely for want of memory: thin the cloud or shrink the photographs"
+    return f"error: a library ended it with {signal.Signals(number).name}: this is a bug; report it with your command"
+
+
+def _axis(up: str) -> str:
+    if up not in _UP:
+        raise OptionError(f"--up: {up}: not an axis: use one of {', '.join(_UP)}")
+    return up
+
+
+def _positive(scale: float | None) -> float | None:
+    if scale is not None and not 0 < scale < float("inf"):
+        raise OptionError(f"--scale: {scale}: not a length: give the millimetres of one capture unit")
+    return scale
+
+
+def _limit_threads(jobs: int | None) -> None:
+    if jobs is not None:
+        os.environ.update(dict.fromkeys(_THREAD_VARIABLES, str(jobs)))

@@ -1,0 +1,168 @@
+"""The only place that knows the order of the stages.
+
+Each stage is a pure function from what the stages before it made, plus its options, to one frozen result. STAGES says
+which needs which; modules are imported when their stage runs, because some take seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kerfwright import __version__
+from kerfwright.progress import Reporter
+
+if TYPE_CHECKING:
+    from kerfwright.assemble.types import Assembly
+    from kerfwright.capture.types import Capture
+    from kerfwright.identify.types import Parts
+    from kerfwright.model import Finding, Model
+
+__all__ = ["STAGES", "ReconstructOptions", "Reconstruction", "Stage", "reconstruct", "run_stages"]
+
+
+@dataclass(frozen=True)
+class ReconstructOptions:
+    """What a user may choose; everything else is the stages' own options.
+
+    Attributes
+    ----------
+    up : axis of the capture that points up: x, y, z, -x, -y or -z.
+    millimetres_per_unit : scale of the capture; None assumes metres.
+    seed : of the one random generator.
+    """
+
+    up: str = "z"
+    millimetres_per_unit: float | None = None
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One step: `run(*results of needs, options)` gives its result."""
+
+    name: str
+    text: str
+    needs: tuple[str, ...]
+    run: Callable[..., Any]
+
+
+@dataclass(frozen=True, eq=False)
+class Reconstruction:
+    """The model, and what the report draws it from."""
+
+    model: Model
+    capture: Capture
+    parts: Parts
+
+
+def reconstruct(
+    capture: Path | str,
+    options: ReconstructOptions | None = None,
+    reporter: Reporter | None = None,
+) -> Reconstruction:
+    """Reconstruct the boards of a capture.
+
+    Parameters
+    ----------
+    capture : folder with images, cameras and a cloud; see docs/formats.md.
+    options : None for the defaults.
+    reporter : told of every stage; keeps their times.
+
+    Raises
+    ------
+    KerfwrightError when the capture cannot be used or a stage finds nothing to go on with.
+    """
+    results = run_stages(Path(capture), options or ReconstructOptions(), reporter or Reporter())
+    return Reconstruction(model=results["check"], capture=results["capture"], parts=results["identify"])
+
+
+def run_stages(
+    path: Path, options: ReconstructOptions, reporter: Reporter, stages: Sequence[Stage] | None = None
+) -> dict[str, Any]:
+    """Run the stages in order; returns every stage's result by name. "path" is the capture's folder."""
+    results: dict[str, Any] = {"path": path}
+    for stage in STAGES if stages is None else stages:
+        with reporter.stage(stage.name, stage.text):
+            results[stage.name] = stage.run(*(results[name] for name in stage.needs), options)
+    return results
+
+
+def _capture(path: Path, options: ReconstructOptions) -> Capture:
+    from kerfwright.capture import PrepareOptions, open_capture, prepare
+
+    opened = open_capture(path, up=options.up, millimetres_per_unit=options.millimetres_per_unit)
+    return prepare(opened, PrepareOptions())
+
+
+def _identify(capture: Capture, options: ReconstructOptions) -> Parts:
+    from kerfwright.identify import IdentifyOptions, identify
+
+    return identify(capture, IdentifyOptions(seed=options.seed))
+
+
+def _assemble(parts: Parts, capture: Capture, options: ReconstructOptions) -> Assembly:
+    from kerfwright.assemble import AssembleOptions, assemble
+
+    return assemble(parts, capture, AssembleOptions())
+
+
+def _refine(assembly: Assembly, parts: Parts, capture: Capture, options: ReconstructOptions) -> Any:
+    from kerfwright.refine import RefineOptions, refine
+
+    return refine(assembly, parts, capture, RefineOptions(seed=options.seed))
+
+
+def _check(refined: Any, assembly: Assembly, parts: Parts, capture: Capture, options: ReconstructOptions) -> Model:
+    from kerfwright.solid import CheckOptions, check
+
+    model = _model(refined, assembly, parts, capture, options)
+    return model.model_copy(update={"findings": (*model.findings, *check(model, CheckOptions()))})
+
+
+STAGES: tuple[Stage, ...] = (
+    Stage("capture", "Reading the capture", ("path",), _capture),
+    Stage("identify", "Finding boards in the cloud", ("capture",), _identify),
+    Stage("assemble", "Finding how the boards meet", ("identify", "capture"), _assemble),
+    Stage("refine", "Tracing cut paths in the photographs", ("assemble", "identify", "capture"), _refine),
+    Stage("check", "Building solids and checking them", ("refine", "assemble", "identify", "capture"), _check),
+)
+
+
+def _model(refined: Any, assembly: Assembly, parts: Parts, capture: Capture, options: ReconstructOptions) -> Model:
+    """Gather what the stages found, their findings in the stages' order."""
+    from dataclasses import asdict
+
+    from kerfwright.model import Model, Provenance
+
+    provenance = Provenance(
+        version=__version__, capture=capture.name, images=len(capture.views), points=len(capture.cloud),
+        seed=options.seed, options=asdict(options),
+    )
+    notes = [_remark("K001", text) for text in capture.notes] + [_remark("K002", text) for text in parts.notes]
+    return Model(
+        name=capture.name, boards=refined.boards, contacts=refined.contacts, scale=capture.scale, provenance=provenance,
+        findings=(*_scale_finding(capture), *notes, *assembly.findings, *refined.findings),
+        capture_from_model=tuple(tuple(float(x) for x in row) for row in capture.capture_from_world),
+    )
+
+
+def _remark(code: str, text: str) -> Finding:
+    from kerfwright.model import Finding
+
+    return Finding(code=code, severity="info", message=text)
+
+
+def _scale_finding(capture: Capture) -> tuple[Finding, ...]:
+    """Nobody should cut wood to an assumed scale unknowingly."""
+    from kerfwright.model import Finding
+
+    if capture.scale.origin != "assumed":
+        return ()
+    return (Finding(
+        code="K003", severity="warning", value=capture.scale.millimetres_per_unit,
+        message=f"the scale is assumed: 1 capture unit = {capture.scale.millimetres_per_unit:g} mm",
+        remedy="measure one board and give --scale, millimetres a unit, before you cut",
+    ),)

@@ -1,0 +1,83 @@
+"""What goes into the output folder of a reconstruction.
+
+`run.json` holds all that may differ from run to run; the other files are the same bytes for the same capture, options
+and version.
+"""
+
+from __future__ import annotations
+
+import json
+import platform
+import resource
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from kerfwright import __version__
+from kerfwright.model import Model
+from kerfwright.progress import Reporter
+from kerfwright.report.figures import figures
+
+__all__ = ["write_results", "write_run"]
+
+# Whose versions can change what comes out.
+_LIBRARIES = (
+    "build123d", "cadquery-ocp", "casadi", "ezdxf", "numba", "numpy", "open3d", "open3d-cpu",
+    "opencv-contrib-python-headless", "PyMaxflow", "scikit-image", "scipy", "shapely",
+)
+
+
+def write_results(model: Model, folder: Path) -> None:
+    """Write model.json, report.json, model.step and parts/*.dxf."""
+    from kerfwright_exporters import ExportOptions, export
+
+    from kerfwright.model import write_model
+
+    write_model(model, folder / "model.json")
+    _write_json(folder / "report.json", report(model))
+    # The files are wanted most when something is wrong with them; `force` stamps them as not verified.
+    options = ExportOptions(force=True)
+    export(model, "step", folder, options)
+    export(model, "dxf", folder / "parts", options)
+
+
+def report(model: Model) -> dict[str, Any]:
+    """The figures, the findings and where the model lies in the capture."""
+    return {
+        "format": "kerfwright-report", "version": 1, "name": model.name,
+        "capture_from_model": [list(row) for row in model.capture_from_model],
+        "figures": figures(model),
+        "findings": [finding.model_dump(mode="json") for finding in model.findings],
+        "provenance": model.provenance.model_dump(mode="json"),
+    }
+
+
+def write_run(reporter: Reporter, path: Path) -> None:
+    """Write times, peak memory and versions."""
+    run = {
+        "seconds": {name: round(seconds, 3) for name, seconds in reporter.seconds.items()},
+        "cached": reporter.reused,
+        "peak_memory_gib": round(_peak_memory_gib(), 3),
+        "kerfwright": __version__, "python": platform.python_version(), "system": platform.platform(),
+        "versions": {name: found for name in _LIBRARIES if (found := _version(name))},
+    }
+    _write_json(path, run)
+
+
+def _peak_memory_gib() -> float:
+    """Largest resident size that this process, or one that it waited for, has had."""
+    unit = 1 if sys.platform == "darwin" else 1024  # getrusage counts kilobytes, but bytes on macOS
+    peak = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return peak * unit / 2**30
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+def _write_json(path: Path, content: dict[str, Any]) -> None:
+    path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
