@@ -1,0 +1,83 @@
+"""What every reader needs: one-line errors, text of known encoding, and numbers that are checked."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from kerfwright.errors import CaptureError
+
+__all__ = ["capture_error", "finite_float", "read_bytes", "read_text", "shown", "whole_number"]
+
+SHOWN_LENGTH = 60
+
+
+def shown(found: object) -> str:
+    """A value as an error shows it: one line, printable, not too long."""
+    text = ascii(found) if not isinstance(found, str) or not found.isprintable() else found
+    return text if len(text) <= SHOWN_LENGTH else text[: SHOWN_LENGTH - 3] + "..."
+
+
+def capture_error(path: Path | str, field: str, found: object, remedy: str) -> CaptureError:
+    """The error for a field of a file: path, field, value found, what to do."""
+    return CaptureError(f"{path}: {field}: {shown(found)}: {remedy}")
+
+
+def finite_float(text: str, path: Path, field: str) -> float:
+    """A number with a decimal point.
+
+    Raises
+    ------
+    CaptureError
+        If the text is not a number, is infinite or NaN.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        remedy = "use a decimal point, not a comma" if "," in text else "a number belongs here: export the file again"
+        raise capture_error(path, field, text, remedy) from None
+    if not math.isfinite(value):
+        raise capture_error(path, field, text, "a finite number belongs here: export the file again")
+    return value
+
+
+def whole_number(text: str, path: Path, field: str, least: int = 0) -> int:
+    """A whole number of at least `least`, in ASCII digits.
+
+    Raises
+    ------
+    CaptureError
+        If the text is anything else.
+    """
+    if not (text.isascii() and text.isdigit() and len(text) < 20) or int(text) < least:
+        raise capture_error(path, field, text, f"a whole number of at least {least} belongs here: export the file again")
+    return int(text)
+
+
+def read_bytes(path: Path) -> bytes:
+    """All of a file.
+
+    Raises
+    ------
+    CaptureError
+        If the file cannot be read.
+    """
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise capture_error(path, "file", error.strerror, "check that it exists and can be read") from error
+
+
+def read_text(path: Path) -> str:
+    """All of a UTF-8 text file, with or without a byte order mark.
+
+    Raises
+    ------
+    CaptureError
+        If the file cannot be read or is not UTF-8.
+    """
+    data = read_bytes(path)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise capture_error(path, f"byte {error.start}", data[error.start : error.start + 4], "save the file as UTF-8") from None

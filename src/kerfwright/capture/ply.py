@@ -1,0 +1,174 @@
+"""Read the points of a PLY file: ASCII and both byte orders; other elements, properties and lists are passed over."""
+
+from __future__ import annotations
+
+import io
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from kerfwright.capture.parsing import capture_error
+from kerfwright.capture.ply_header import ASCII, Element, PlyHeader, read_header
+
+__all__ = ["PlyPoints", "read_ply"]
+
+MOST_POINTS = 100_000_000  # 5 GB of coordinates and normals; a cloud of a piece of carpentry needs a hundredth
+COLUMNS = {
+    "points": (("x", "y", "z"),),
+    "normals": (("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z")),
+    "colours": (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue")),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class PlyPoints:
+    """Columns of the vertices: points (N, 3) float64; normals (N, 3) float64 and colours (N, 3) uint8, or None."""
+
+    points: np.ndarray
+    normals: np.ndarray | None
+    colours: np.ndarray | None
+
+
+def read_ply(path: Path) -> PlyPoints:
+    """Read the vertices as they are: values are not judged, NaN included.
+
+    Raises
+    ------
+    CaptureError
+        If the file cannot be read, is damaged, or has no coordinates.
+    """
+    try:
+        with path.open("rb") as file:
+            header = read_header(file, path)
+            index, element = _vertices(header)
+            columns = [_indices(element, names) for names in COLUMNS.values()]
+            wanted = [i for triple in columns for i in triple or ()]
+            file.seek(header.size)
+            read = _ascii_columns if header.encoding == ASCII else _binary_columns
+            table = dict(zip(wanted, read(file, header, index, wanted), strict=True))
+    except OSError as error:
+        raise capture_error(path, "file", error.strerror, "check that it exists and can be read") from error
+    points, normals, colours = ([table[i] for i in triple] if triple else None for triple in columns)
+    return PlyPoints(_stacked(points), _stacked(normals) if normals else None, _bytes(colours) if colours else None)
+
+
+def _vertices(header: PlyHeader) -> tuple[int, Element]:
+    index = next((i for i, e in enumerate(header.elements) if e.name == "vertex"), None)
+    if index is None:
+        raise capture_error(header.path, "element vertex", "missing", "export a cloud of points")
+    element = header.elements[index]
+    if _indices(element, COLUMNS["points"]) is None:
+        names = " ".join(p.name for p in element.properties) or "none"
+        raise capture_error(header.path, "vertex properties", names, "x, y and z are needed: export the cloud again")
+    if element.count > MOST_POINTS:
+        raise capture_error(header.path, "element vertex", element.count, f"at most {MOST_POINTS}: thin the cloud")
+    return index, element
+
+
+def _indices(element: Element, choices: tuple[tuple[str, ...], ...]) -> tuple[int, ...] | None:
+    """Indices of the first triple of properties that is there as a whole."""
+    place = {p.name: i for i, p in reversed(list(enumerate(element.properties))) if p.length is None}
+    return next((tuple(place[n] for n in names) for names in choices if all(n in place for n in names)), None)
+
+
+def _stacked(columns: list[np.ndarray]) -> np.ndarray:
+    out = np.empty((len(columns[0]), len(columns)))
+    for i, column in enumerate(columns):
+        out[:, i] = column
+    return out
+
+
+def _bytes(columns: list[np.ndarray]) -> np.ndarray:
+    """Colours 0 to 255, whatever the file's type: real numbers are taken as 0 to 1, if none is larger."""
+    if all(c.dtype == np.uint8 for c in columns):
+        return np.stack(columns, axis=1)
+    values = np.nan_to_num(_stacked(columns))
+    if columns[0].dtype.kind == "u":
+        factor = 255 / np.iinfo(columns[0].dtype).max
+    else:
+        factor = 255.0 if columns[0].dtype.kind == "f" and values.size and values.max() <= 1 else 1.0
+    return np.clip(np.round(values * factor), 0, 255).astype(np.uint8)
+
+
+def _binary_columns(file: BinaryIO, header: PlyHeader, index: int, wanted: list[int]) -> list[np.ndarray]:
+    for element in header.elements[:index]:
+        if element.has_lists:
+            for _ in _list_rows(file, element, header):
+                pass
+        else:
+            file.seek(element.count * element.row.itemsize, io.SEEK_CUR)
+    element = header.elements[index]
+    if element.has_lists:
+        rows = np.array([[row[i] for i in wanted] for row in _list_rows(file, element, header)], ndmin=2)
+        return [rows[:, k].astype(element.properties[i].kind.newbyteorder("=")) for k, i in enumerate(wanted)]
+    rows = np.fromfile(file, element.row, element.count)
+    if len(rows) < element.count:
+        raise _cut_short(header, element, len(rows))
+    return [rows[str(i)] for i in wanted]
+
+
+def _cut_short(header: PlyHeader, element: Element, found: int) -> Exception:
+    return capture_error(header.path, f"element {element.name}", f"{found} rows of {element.count}",
+                         "the file is cut short: copy or export it again")
+
+
+def _list_rows(file: BinaryIO, element: Element, header: PlyHeader) -> Iterator[list[float | None]]:
+    """Row by row, as each has its own size; lists give None."""
+    for found in range(element.count):
+        try:
+            yield [_value(file, p.kind, p.length) for p in element.properties]
+        except struct.error:
+            raise _cut_short(header, element, found) from None
+
+
+def _value(file: BinaryIO, kind: np.dtype, length: np.dtype | None) -> float | None:
+    if length is None:
+        return struct.unpack(_code(kind), file.read(kind.itemsize))[0]
+    count = int(struct.unpack(_code(length), file.read(length.itemsize))[0])
+    file.seek(max(count, 0) * kind.itemsize, io.SEEK_CUR)
+    return None
+
+
+def _code(kind: np.dtype) -> str:
+    """struct's code of a number type."""
+    return (kind.byteorder if kind.byteorder in "<>" else "<" if np.little_endian else ">") + kind.char.replace("l", "i").replace("L", "I")
+
+
+def _ascii_columns(file: BinaryIO, header: PlyHeader, index: int, wanted: list[int]) -> list[np.ndarray]:
+    """The element's columns as float64; colours of whole numbers keep their type."""
+    text = io.TextIOWrapper(file, encoding="latin-1")
+    for element in header.elements[:index]:
+        _pass_over(text, element)
+    element = header.elements[index]
+    source = _without_lists(text, element) if element.has_lists else text
+    try:
+        table = np.loadtxt(source, usecols=wanted, max_rows=element.count, comments=None, ndmin=2) if element.count else np.empty((0, len(wanted)))
+    except ValueError as error:
+        raise capture_error(header.path, "element vertex", str(error).split(";")[0], "numbers with decimal points belong here: export the cloud again") from None
+    if len(table) < element.count:
+        raise _cut_short(header, element, len(table))
+    return [table[:, k].astype(element.properties[i].kind if element.properties[i].kind.kind != "f" else float, copy=False) for k, i in enumerate(wanted)]
+
+
+def _pass_over(text: io.TextIOBase, element: Element) -> None:
+    left = element.count
+    while left and (line := text.readline()):
+        left -= bool(line.strip())
+
+
+def _without_lists(text: io.TextIOBase, element: Element) -> Iterator[str]:
+    """Lines with a zero in the place of each list."""
+    for line in text:
+        words = iter(line.split())
+        out = []
+        for p in element.properties:
+            word = next(words, "")
+            if p.length is not None:
+                for _ in range(int(word) if word.isdigit() else 0):
+                    next(words, None)
+            out.append("0" if p.length is not None else word)
+        yield " ".join(out)
