@@ -15,8 +15,19 @@ from kerfwright.model.cutpath import CutPath
 from kerfwright.model.quantity import Frozen, Origin, Quantity
 
 __all__ = [
-    "Bevel", "Board", "BuildStep", "Connector", "Contact", "ContactEvidence", "Face", "Finding", "Matrix4", "Model",
-    "Point3", "Provenance", "Scale",
+    "Bevel",
+    "Board",
+    "BuildStep",
+    "Connector",
+    "Contact",
+    "ContactEvidence",
+    "Face",
+    "Finding",
+    "Matrix4",
+    "Model",
+    "Point3",
+    "Provenance",
+    "Scale",
 ]
 
 Point3 = tuple[float, float, float]

@@ -1,0 +1,142 @@
+"""A board as something to cut: loops, bevel lines and a label, by operation; what DXF, SVG and sheets all draw.
+
+Board frame seen from the top: x to the right, y up, millimetres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from kerfwright.model import Board, CutPath, Loop
+from kerfwright.model.arcs import arc_path
+from kerfwright.model.geometry import path_polygon, transform_loop
+from kerfwright_exporters.naming import STAMP, ascii_name
+from kerfwright_exporters.options import ExportOptions
+
+if TYPE_CHECKING:
+    from shapely.geometry import Polygon
+
+__all__ = ["BevelLine", "Cut", "Drawing", "Text", "board_drawing", "cutting_path", "moved_drawing"]
+
+LETTER_WIDTH = 0.95  # of a letter's height, with the space after it, in the widest of the usual fonts
+TEXT_HEIGHTS = (12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5)  # mm, the largest that fits is taken
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A closed loop to cut through; `depth` is the board's thickness, mm."""
+
+    operation: Literal["inside", "outside"]
+    loop: Loop
+    depth: float
+
+
+@dataclass(frozen=True)
+class BevelLine:
+    """A stretch of the outline to cut at a slant; the angle in degrees, positive when the top is the shorter side."""
+
+    start: tuple[float, float]
+    end: tuple[float, float]
+    angle: float
+
+
+@dataclass(frozen=True)
+class Text:
+    """One line of text, centred on a point; height in mm, turn in radians."""
+
+    operation: Literal["bevel", "label", "stamp"]
+    text: str
+    at: tuple[float, float]
+    height: float
+    turn: float = 0.0
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Everything to draw of one board, in the order of cutting: inside cuts come before the outline that holds them."""
+
+    cuts: tuple[Cut, ...]
+    bevels: tuple[BevelLine, ...]
+    texts: tuple[Text, ...]
+
+
+def board_drawing(board: Board, options: ExportOptions) -> Drawing:
+    """The board's drawing in its own frame."""
+    path = cutting_path(board, options)
+    depth = board.thickness.value
+    cuts = (*(Cut("inside", hole, depth) for hole in path.holes), Cut("outside", path.outer, depth))
+    bevels = tuple(BevelLine(b.start, b.end, b.angle.value) for b in board.bevels)
+    return Drawing(cuts, bevels, tuple(_texts(board, path, bevels, options)))
+
+
+def cutting_path(board: Board, options: ExportOptions) -> CutPath:
+    """The cut path as the files carry it: Beziers as arcs unless splines were asked for."""
+    return board.cut_path if options.splines else arc_path(board.cut_path, options.arc_tolerance)
+
+
+def _texts(board: Board, path: CutPath, bevels: tuple[BevelLine, ...], options: ExportOptions) -> Iterator[Text]:
+    polygon = path_polygon(path, 0.1)
+    lines = [ascii_name(board.name), *([STAMP] if options.unverified else [])]
+    (x, y), size = _room(polygon, lines)
+    for row, (operation, text) in enumerate(zip(("label", "stamp"), lines, strict=False)):
+        yield Text(operation, text, (x, y + (0.75 * (len(lines) - 1) - 1.5 * row) * size), size)
+    for (start, end), angles in _by_stretch(bevels).items():
+        yield _bevel_text(start, end, angles, size)
+
+
+def _room(polygon: Polygon, lines: list[str]) -> tuple[tuple[float, float], float]:
+    """Where the lines of text fit on the board, centred, and the largest height that keeps them on it, mm."""
+    import shapely
+
+    widest = LETTER_WIDTH * max(len(line) for line in lines)
+    rows = 1.5 * len(lines)
+    inscribed = shapely.maximum_inscribed_circle(polygon, tolerance=1.0).coords
+    centres = (polygon.centroid.coords[0], inscribed[0], polygon.representative_point().coords[0])
+    for size in TEXT_HEIGHTS:
+        for x, y in centres:
+            half_width, half_height = size * widest / 2, size * rows / 2
+            if polygon.covers(shapely.box(x - half_width, y - half_height, x + half_width, y + half_height)):
+                return (x, y), size
+    return inscribed[0], TEXT_HEIGHTS[-1]
+
+
+def _by_stretch(bevels: tuple[BevelLine, ...]) -> dict[tuple, list[float]]:
+    """Angles of the bevels, those of one stretch together."""
+    found: dict[tuple, list[float]] = {}
+    for bevel in bevels:
+        found.setdefault((bevel.start, bevel.end), []).append(bevel.angle)
+    return found
+
+
+def _bevel_text(start: tuple[float, float], end: tuple[float, float], angles: list[float], size: float) -> Text:
+    """The angles, beside the middle of the stretch, on the board, reading along the cut."""
+    first, last = np.array(start), np.array(end)
+    length = np.hypot(*(last - first))
+    along = (last - first) / length
+    text = "BEVEL " + " ".join(f"{angle:+.1f}" for angle in angles)
+    height = float(min(size, 0.9 * length / (LETTER_WIDTH * len(text))))
+    at = (first + last) / 2 + height * np.array([-along[1], along[0]])
+    turn = float(np.arctan2(along[1], along[0]))
+    if abs(turn) > np.pi / 2 + 1e-9:  # never upside down
+        turn -= np.sign(turn) * np.pi
+    return Text("bevel", text, (float(at[0]), float(at[1])), height, turn)
+
+
+def moved_drawing(drawing: Drawing, target_from_board: np.ndarray) -> Drawing:
+    """The drawing after a turn and a move, (2, 3), not a mirror image."""
+    m = np.asarray(target_from_board, float)
+    turn = float(np.arctan2(m[1, 0], m[0, 0]))
+
+    def at(point: tuple[float, float]) -> tuple[float, float]:
+        x, y = m[:, :2] @ np.array(point) + m[:, 2]
+        return float(x), float(y)
+
+    return Drawing(
+        tuple(Cut(c.operation, transform_loop(c.loop, m), c.depth) for c in drawing.cuts),
+        tuple(BevelLine(at(b.start), at(b.end), b.angle) for b in drawing.bevels),
+        tuple(Text(t.operation, t.text, at(t.at), t.height, t.turn + turn) for t in drawing.texts),
+    )
