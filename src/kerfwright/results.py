@@ -16,6 +16,7 @@ from typing import Any
 
 from kerfwright import __version__
 from kerfwright.model import Model
+from kerfwright.model.io import write_model
 from kerfwright.progress import Reporter
 from kerfwright.report.figures import figures
 
@@ -30,16 +31,12 @@ _LIBRARIES = (
 
 def write_results(model: Model, folder: Path) -> None:
     """Write model.json, report.json, model.step and parts/*.dxf."""
-    from kerfwright_exporters import ExportOptions, export
-
-    from kerfwright.model import write_model
+    from kerfwright_exporters import export_all
 
     write_model(model, folder / "model.json")
     _write_json(folder / "report.json", report(model))
-    # The files are wanted most when something is wrong with them; `force` stamps them as not verified.
-    options = ExportOptions(force=True)
-    export(model, "step", folder, options)
-    export(model, "dxf", folder / "parts", options)
+    # To look at the files is how one finds out what is wrong with them; `force` stamps them NOT VERIFIED then.
+    export_all(model, ("step", "dxf"), folder, force=True, findings=model.findings)
 
 
 def report(model: Model) -> dict[str, Any]:

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from kerfwright.commands.reconstruct import say_errors
+
 __all__ = ["export"]
 
 
@@ -19,18 +21,21 @@ def export(
     ] = False,
 ) -> None:
     """Write MODEL as STEP, DXF, a build123d script, cut sheets and more."""
-    from kerfwright_exporters import ExportOptions
-    from kerfwright_exporters import export as export_model
+    from kerfwright_exporters import export_all, exporter
 
-    from kerfwright.model import read_model
+    from kerfwright.model.io import read_model
     from kerfwright.output import OutputFolder
+    from kerfwright.solid import check
 
+    for name in formats:
+        exporter(name)  # an unknown format is an error before anything slow
     loaded = read_model(model)
-
-    def fill(folder: Path) -> None:
-        for name in dict.fromkeys(formats):
-            export_model(loaded, name, folder, ExportOptions(force=force))
-
     with OutputFolder(out).claimed() as folder:
-        for path in folder.write(fill, keep_others=True):
+        findings = check(loaded)
+        if say_errors(findings) and not force:
+            typer.echo("kerfwright: not exported: mend the model, or --force it, stamped NOT VERIFIED", err=True)
+            raise typer.Exit(1)
+        for path in folder.write(
+            lambda partial: export_all(loaded, formats, partial, force=force, findings=findings), keep_others=True
+        ):
             typer.echo(path)

@@ -19,7 +19,7 @@ from kerfwright.supervise import supervised
 if TYPE_CHECKING:
     from kerfwright.model import Finding
 
-__all__ = ["reconstruct", "run_reconstruct"]
+__all__ = ["reconstruct", "run_reconstruct", "say_errors"]
 
 _UP = ("x", "y", "z", "-x", "-y", "-z")
 # Read by the numeric libraries when they are first imported.
@@ -68,7 +68,7 @@ def run_reconstruct(
         found = _reconstruct_into(folder, capture, options, reporter)
         if farewell:
             typer.echo(farewell)
-        return _verdict(found)
+        return 1 if say_errors(found) else 0
 
     with OutputFolder(out).claimed() as folder:
         code = supervised(lambda: guarded(work))
@@ -94,12 +94,12 @@ def _reconstruct_into(
     return found.model.findings
 
 
-def _verdict(findings: tuple[Finding, ...]) -> int:
-    """Say what the checker found wrong; 1 when it forbids cutting."""
+def say_errors(findings: tuple[Finding, ...]) -> int:
+    """Say on standard error what forbids cutting; returns how much there is."""
     errors = [f for f in findings if f.severity == "error"]
     for finding in errors:
         typer.echo(f"kerfwright: {finding.code}: {finding.message}: {finding.remedy}", err=True)
-    return 1 if errors else 0
+    return len(errors)
 
 
 def _ending(code: int) -> str:
