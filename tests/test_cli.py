@@ -99,7 +99,7 @@ def test_reconstruct_writes_and_tells(tmp_path):
     assert done.returncode == 0, done.stderr
     assert str(tmp_path / "out") in done.stdout
     assert [line.split()[0] for line in done.stderr.splitlines()] == ["Reading", "Finding", "Checking", "Writing"]
-    assert sorted(os.listdir(tmp_path / "out")) == [".kerfwright.json", "model.json", "run.json"]
+    assert sorted(os.listdir(tmp_path / "out")) == [".cache", ".kerfwright.json", "model.json", "run.json"]
     record = json.loads((tmp_path / "out" / "run.json").read_text())
     assert list(record["seconds"]) == ["capture", "identify", "check", "write"]
     assert 0.01 < record["peak_memory_gib"] < 1
@@ -151,19 +151,19 @@ def test_a_library_that_crashes_is_said(tmp_path):
 def test_ctrl_c_ends_it_at_once_and_keeps_the_old_results(tmp_path, number, code):
     out = tmp_path / "out"
     run(fake("reconstruct", "c", "-o", out), check=True)
-    before = {p: p.read_bytes() for p in out.iterdir()}
+    before = {p: p.read_bytes() for p in out.iterdir() if p.is_file()}
     stuck = "print('stuck', flush=True); ctypes.PyDLL(None).sleep(30)"
     process = subprocess.Popen(
-        fake("reconstruct", "c", "-o", out, action=stuck), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        start_new_session=True,
+        fake("reconstruct", "c", "-o", out, "--seed", 1, action=stuck), stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True, start_new_session=True,
     )
     assert process.stdout.readline() == "stuck\n"
     began = time.monotonic()
     os.killpg(process.pid, number)
     _, errors = process.communicate(timeout=5)
     assert time.monotonic() - began < 1 and process.returncode == code
-    assert errors == "kerfwright: interrupted; the output folder is as it was\n"
-    assert {p: p.read_bytes() for p in out.iterdir()} == before
+    assert errors.startswith("kerfwright: interrupted") and errors.count("\n") == 1
+    assert {p: p.read_bytes() for p in out.iterdir() if p.is_file()} == before
 
 
 def test_a_terminal_gets_its_cursor_back_after_ctrl_c(tmp_path):
@@ -185,7 +185,7 @@ def test_the_same_bytes_but_for_run_json(tmp_path):
     for name in ("one", "two"):
         run(fake("reconstruct", "c", "-o", tmp_path / name), check=True)
     for path in sorted((tmp_path / "one").iterdir()):
-        if path.name != "run.json":
+        if path.is_file() and path.name != "run.json":
             assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes(), path.name
 
 
@@ -202,3 +202,71 @@ def test_the_shipped_capture_is_as_small_as_promised():
     assert sum(p.stat().st_size for p in files) < 8e6
     header = (demo_capture() / "cloud.ply").read_bytes()[:400].decode("latin-1")
     assert "element vertex 120000" in header
+
+
+# Three stages that tell when they run; the process is killed in stage `dies`, or in mid-write.
+RESUMING = """
+import os, sys
+from pathlib import Path
+from kerfwright import pipeline, results
+from kerfwright.cli import main
+from kerfwright.model import Model
+dies, log = sys.argv.pop(1), Path(sys.argv.pop(1))
+
+def stage(name, needs):
+    def run(*arguments):
+        with log.open("a") as lines:
+            lines.write(name + " ")
+        if name == dies:
+            os.kill(os.getppid() if len(arguments) % 2 else os.getpid(), 9)  # now the parent, now the child
+            import time; time.sleep(5)
+        return Model(name=name) if name == "check" else name
+    return pipeline.Stage(name, name, needs, run)
+
+def written(model, folder):
+    (folder / "model.json").write_text(model.model_dump_json())
+    if dies == "write":
+        os.kill(os.getppid(), 9)
+        import time; time.sleep(5)
+
+NEEDS = {"capture": ("path",), "identify": ("capture",), "check": ("identify", "capture")}
+pipeline.STAGES = tuple(stage(name, needs) for name, needs in NEEDS.items())
+results.write_results = written
+main()
+"""
+
+
+@pytest.mark.parametrize(("dies", "again"), [
+    ("capture", "capture identify check"), ("identify", "identify check"), ("check", "check"), ("write", ""),
+])
+def test_killed_and_run_again_it_goes_on_and_gives_the_same_files(tmp_path, dies, again):
+    log = tmp_path / "log"
+
+    def reconstruct(out: str, dies: str) -> subprocess.CompletedProcess:
+        log.write_text("")
+        arguments = ["reconstruct", tmp_path / "c", "-o", tmp_path / out, "-q"]
+        return run([sys.executable, "-c", RESUMING, dies, log, *arguments])
+
+    (tmp_path / "c").mkdir()
+    assert reconstruct("straight", "never").returncode == 0
+    assert reconstruct("resumed", dies).returncode in (-9, 137)
+    assert reconstruct("resumed", "never").returncode == 0
+    assert log.read_text().strip() == again
+    for name in ("model.json", ".kerfwright.json"):
+        assert (tmp_path / "resumed" / name).read_bytes() == (tmp_path / "straight" / name).read_bytes()
+    assert sorted(os.listdir(tmp_path / "resumed")) == sorted(os.listdir(tmp_path / "straight"))
+    kept = json.loads((tmp_path / "resumed" / "run.json").read_text())["cached"]
+    assert kept == [s for s in ("capture", "identify", "check") if s not in again]
+
+
+def test_a_second_run_on_the_same_folder_is_refused(tmp_path):
+    stuck = "print('stuck', flush=True); time.sleep(30)"
+    first = subprocess.Popen(
+        fake("reconstruct", "c", "-o", tmp_path / "out", action=stuck), stdout=subprocess.PIPE, text=True
+    )
+    assert first.stdout.readline() == "stuck\n"
+    second = run(fake("reconstruct", "c", "-o", tmp_path / "out"))
+    first.terminate()
+    first.wait(5)
+    assert second.returncode == 2 and f"process {first.pid} is writing" in second.stderr
+    assert run(fake("reconstruct", "c", "-o", tmp_path / "out")).returncode == 0, "the lock goes with its holder"

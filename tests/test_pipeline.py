@@ -44,7 +44,7 @@ def test_stages_run_in_order_and_get_what_they_need():
     needs = {"a": ("path",), "b": ("a",), "c": ("b", "path", "a")}
     stages = [Stage(name, name, before, step) for name, before in needs.items()]
     reporter, options = Reporter(), ReconstructOptions()
-    results = run_stages("here", options, reporter, stages)
+    results = run_stages("here", options, reporter, stages=stages)
     assert seen == [("here", options), (1, options), (2, "here", 1, options)]
     assert results == {"path": "here", "a": 1, "b": 2, "c": 3}
     assert list(reporter.seconds) == ["a", "b", "c"]
@@ -57,7 +57,7 @@ def test_a_stage_that_fails_ends_the_run():
     reached = []
     stages = [Stage("a", "A", (), fails), Stage("b", "B", (), lambda *_: reached.append(1))]
     with pytest.raises(StageError):
-        run_stages("here", ReconstructOptions(), Reporter(), stages)
+        run_stages("here", ReconstructOptions(), Reporter(), stages=stages)
     assert not reached
 
 

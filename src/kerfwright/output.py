@@ -44,6 +44,10 @@ class OutputFolder:
         """Where stages keep their results; may not exist yet."""
         return self.path / CACHE
 
+    def drop_cache(self) -> None:
+        """Forget the stages' results."""
+        shutil.rmtree(self.cache, ignore_errors=True)
+
     @contextmanager
     def claimed(self) -> Iterator[OutputFolder]:
         """Hold the folder: checked, created, locked. On leaving, what is half done goes, as does a folder left empty.

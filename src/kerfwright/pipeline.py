@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kerfwright import __version__
+from kerfwright.cache import NO_CACHE, StageCache, folder_hash, program_hash
+from kerfwright.output import OutputFolder
 from kerfwright.progress import Reporter
 
 if TYPE_CHECKING:
@@ -20,7 +23,7 @@ if TYPE_CHECKING:
     from kerfwright.identify.types import Parts
     from kerfwright.model import Finding, Model
 
-__all__ = ["STAGES", "ReconstructOptions", "Reconstruction", "Stage", "reconstruct", "run_stages"]
+__all__ = ["STAGES", "ReconstructOptions", "Reconstruction", "Stage", "reconstruct", "run_stages", "stage_cache"]
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,7 @@ def reconstruct(
     capture: Path | str,
     options: ReconstructOptions | None = None,
     reporter: Reporter | None = None,
+    cache: StageCache = NO_CACHE,
 ) -> Reconstruction:
     """Reconstruct the boards of a capture.
 
@@ -70,23 +74,37 @@ def reconstruct(
     capture : folder with images, cameras and a cloud; see docs/formats.md.
     options : None for the defaults.
     reporter : told of every stage; keeps their times.
+    cache : where stages that have run before find their results; see `stage_cache`.
 
     Raises
     ------
     KerfwrightError when the capture cannot be used or a stage finds nothing to go on with.
     """
-    results = run_stages(Path(capture), options or ReconstructOptions(), reporter or Reporter())
+    results = run_stages(Path(capture), options or ReconstructOptions(), reporter or Reporter(), cache)
     return Reconstruction(model=results["check"], capture=results["capture"], parts=results["identify"])
 
 
+def stage_cache(capture: Path, options: ReconstructOptions, out: OutputFolder) -> StageCache:
+    """The cache in an output folder, for this capture and these options."""
+    return StageCache(out.cache, lambda: f"{program_hash()} {options} {folder_hash(capture, leave_out=out.path)}")
+
+
 def run_stages(
-    path: Path, options: ReconstructOptions, reporter: Reporter, stages: Sequence[Stage] | None = None
+    path: Path,
+    options: ReconstructOptions,
+    reporter: Reporter,
+    cache: StageCache = NO_CACHE,
+    stages: Sequence[Stage] | None = None,
 ) -> dict[str, Any]:
     """Run the stages in order; returns every stage's result by name. "path" is the capture's folder."""
     results: dict[str, Any] = {"path": path}
     for stage in STAGES if stages is None else stages:
         with reporter.stage(stage.name, stage.text):
-            results[stage.name] = stage.run(*(results[name] for name in stage.needs), options)
+            run = partial(stage.run, *(results[name] for name in stage.needs), options)
+            results[stage.name], kept = cache.get(stage.name, stage.needs, run)
+            if kept:
+                reporter.reuse(stage.name)
+    cache.prune()
     return results
 
 

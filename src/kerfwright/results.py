@@ -10,7 +10,6 @@ import json
 import platform
 import resource
 import sys
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +18,9 @@ from kerfwright.model import Model
 from kerfwright.model.io import write_model
 from kerfwright.progress import Reporter
 from kerfwright.report.figures import figures
+from kerfwright.versions import library_versions
 
 __all__ = ["write_results", "write_run"]
-
-# Whose versions can change what comes out.
-_LIBRARIES = (
-    "build123d", "cadquery-ocp", "casadi", "ezdxf", "numba", "numpy", "open3d", "open3d-cpu",
-    "opencv-contrib-python-headless", "PyMaxflow", "scikit-image", "scipy", "shapely",
-)
 
 
 def write_results(model: Model, folder: Path) -> None:
@@ -57,7 +51,7 @@ def write_run(reporter: Reporter, path: Path) -> None:
         "cached": reporter.reused,
         "peak_memory_gib": round(_peak_memory_gib(), 3),
         "kerfwright": __version__, "python": platform.python_version(), "system": platform.platform(),
-        "versions": {name: found for name in _LIBRARIES if (found := _version(name))},
+        "versions": library_versions(),
     }
     _write_json(path, run)
 
@@ -67,13 +61,6 @@ def _peak_memory_gib() -> float:
     unit = 1 if sys.platform == "darwin" else 1024  # getrusage counts kilobytes, but bytes on macOS
     peak = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return peak * unit / 2**30
-
-
-def _version(name: str) -> str | None:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return None
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:

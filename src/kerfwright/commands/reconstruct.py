@@ -72,6 +72,8 @@ def run_reconstruct(
 
     with OutputFolder(out).claimed() as folder:
         code = supervised(lambda: guarded(work))
+        if code == 2:  # what was computed from unusable input is of no use
+            folder.drop_cache()
     if code > 128:
         sys.stderr.write("\x1b[?25h" if sys.stderr.isatty() else "")  # the child may have hidden the cursor
         typer.echo(f"kerfwright: {_ending(code)}", err=True)
@@ -89,7 +91,7 @@ def _reconstruct_into(
             write_results(found.model, partial)
         write_run(reporter, partial / "run.json")
 
-    found = pipeline.reconstruct(capture, options, reporter)
+    found = pipeline.reconstruct(capture, options, reporter, pipeline.stage_cache(capture, options, folder))
     folder.write(fill)
     return found.model.findings
 
@@ -107,7 +109,7 @@ def _ending(code: int) -> str:
 
     number = code - 128
     if number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        return "interrupted; the output folder is as it was"
+        return "interrupted; earlier results are as they were, and the same command goes on where this one was"
     if number == signal.SIGKILL:
         return "error: the system ended it, most likely for want of memory: thin the cloud or shrink the photographs"
     return f"error: a library ended it with {signal.Signals(number).name}: this is a bug; report it with your command"

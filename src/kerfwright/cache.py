@@ -1,0 +1,155 @@
+"""Results of stages, kept so that a run that was ended goes on where it was.
+
+The key of a result is a hash of everything that it can depend on: the bytes of the capture's files, the options,
+kerfwright's own source, the versions of the libraries, and the keys of the stages that it needs. Nothing is ever looked
+up by name or time alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import pickle
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from kerfwright.errors import CaptureError, OutputError
+from kerfwright.versions import library_versions
+
+__all__ = ["NO_CACHE", "StageCache", "folder_hash", "program_hash"]
+
+# What unpickling may call besides kerfwright's own classes: builders of arrays and of polygons, and plain values.
+_ALLOWED = frozenset((
+    ("builtins", "frozenset"), ("builtins", "set"), ("numpy", "dtype"), ("numpy", "ndarray"),
+    ("numpy._core.multiarray", "_reconstruct"), ("numpy._core.multiarray", "scalar"),
+    ("numpy._core.numeric", "_frombuffer"), ("pathlib", "PosixPath"), ("shapely.io", "from_wkb"),
+))
+_DIGEST_BYTES = 32
+
+
+class StageCache:
+    """Results by stage and key, one file each, in a folder.
+
+    Parameters
+    ----------
+    folder : made when the first result is kept; None keeps nothing.
+    basis : called once, when the first key is needed: a hash of what all results depend on.
+    """
+
+    def __init__(self, folder: Path | None, basis: Callable[[], str] = str) -> None:
+        self._folder = folder
+        self._basis = basis
+        self._keys: dict[str, str] = {}
+
+    def get(self, name: str, needs: Iterable[str], make: Callable[[], Any]) -> tuple[Any, bool]:
+        """The result of stage `name`, and whether it was there already; made and kept otherwise.
+
+        Raises OutputError when the disk is full.
+        """
+        if self._folder is None:
+            return make(), False
+        path = self._path(name, needs)
+        kept = _read(path)
+        if kept is not None:
+            return kept[0], True
+        result = make()
+        self._keep(path, result)
+        return result, False
+
+    def prune(self) -> None:
+        """Drop what this run did not use."""
+        if self._folder is not None and self._folder.is_dir():
+            used = {self._file(name) for name in self._keys}
+            for path in sorted(self._folder.iterdir()):
+                if path not in used:
+                    path.unlink()
+
+    def _path(self, name: str, needs: Iterable[str]) -> Path:
+        if not self._keys:
+            self._keys["path"] = self._basis()
+        parts = [name, *(self._keys[need] for need in needs)]
+        self._keys[name] = hashlib.sha256("\n".join(parts).encode()).hexdigest()
+        return self._file(name)
+
+    def _file(self, name: str) -> Path:
+        return self._folder / f"{name}-{self._keys[name][:32]}"
+
+    def _keep(self, path: Path, result: Any) -> None:
+        data = pickle.dumps(result, protocol=5)
+        beside = path.with_name(f"{path.name}.partial")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            beside.write_bytes(hashlib.sha256(data).digest() + data)
+            os.replace(beside, path)
+        except OSError as error:
+            beside.unlink(missing_ok=True)
+            raise OutputError(f"{path}: cache: {error.strerror}: free some space or choose another folder") from error
+
+
+NO_CACHE = StageCache(None)
+
+
+def _read(path: Path) -> tuple[Any] | None:
+    """The result in a file; None when it is not there or not whole."""
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        return None
+    digest, body = data[:_DIGEST_BYTES], data[_DIGEST_BYTES:]
+    if hashlib.sha256(body).digest() != digest:
+        return None
+    return (_Unpickler(io.BytesIO(body)).load(),)
+
+
+class _Unpickler(pickle.Unpickler):
+    """Builds results of stages and nothing else: an output folder may come from a stranger."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        """The class or function of that name, if a result may hold it."""
+        if module.split(".")[0] == "kerfwright":
+            found = super().find_class(module, name)
+            if isinstance(found, type):
+                return found
+        elif (module, name) in _ALLOWED:
+            return super().find_class(module, name)
+        raise OutputError(f"cache: {module}.{name}: not what kerfwright keeps there: delete the folder's .cache")
+
+
+def folder_hash(folder: Path, leave_out: Path | None = None) -> str:
+    """Hash of the names and bytes of a folder's files, hidden ones and those below `leave_out` apart.
+
+    Raises CaptureError when a file cannot be read.
+    """
+    total = hashlib.sha256(str(folder.resolve()).encode())
+    for path in _files(folder, leave_out):
+        try:
+            with path.open("rb") as stream:
+                digest = hashlib.file_digest(stream, "sha256").hexdigest()
+        except OSError as error:
+            raise CaptureError(f"{path}: file: {error.strerror}: make it readable or take it away") from error
+        total.update(f"{path.relative_to(folder).as_posix()}\0{digest}\n".encode("utf-8", "surrogateescape"))
+    return total.hexdigest()
+
+
+def _files(folder: Path, leave_out: Path | None) -> list[Path]:
+    if not folder.is_dir():
+        return []
+    excluded = None if leave_out is None else leave_out.resolve()
+    return [
+        path for path in sorted(folder.rglob("*"))
+        if path.is_file() and not any(part.startswith(".") for part in path.relative_to(folder).parts)
+        and excluded not in path.resolve().parents
+    ]
+
+
+def program_hash() -> str:
+    """Hash of what computes: kerfwright's source, Python, and the libraries' versions."""
+    package = Path(__file__).parent
+    total = hashlib.sha256(sys.version.encode())
+    for path in sorted(package.rglob("*.py")):
+        total.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes())
+    total.update(repr(library_versions()).encode())
+    return total.hexdigest()

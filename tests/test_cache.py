@@ -1,0 +1,149 @@
+"""Stages that ran once are not run again, unless anything they depend on has changed."""
+
+import errno
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shapely.geometry import Polygon
+
+from kerfwright import cache as cache_module
+from kerfwright.cache import StageCache, folder_hash, program_hash
+from kerfwright.capture.camera import Camera
+from kerfwright.capture.types import Capture, Cloud, View
+from kerfwright.errors import OutputError
+from kerfwright.identify.types import Parts, Primitive, Sheet
+from kerfwright.model import Quantity, Scale
+
+
+class Counter:
+    """A stage that counts how often it ran."""
+
+    def __init__(self, result):
+        self.result, self.runs = result, 0
+
+    def __call__(self):
+        self.runs += 1
+        return self.result
+
+
+def run(folder: Path, stages: dict, basis: str = "b") -> dict:
+    """Run stages, each needing the one before; returns which came from the cache."""
+    cache = StageCache(folder, lambda: basis)
+    reused, before = {}, "path"
+    for name, stage in stages.items():
+        _, reused[name] = cache.get(name, (before,), stage)
+        before = name
+    cache.prune()
+    return reused
+
+
+def test_a_second_run_runs_nothing(tmp_path):
+    stages = {"a": Counter(1), "b": Counter(2)}
+    assert run(tmp_path, stages) == {"a": False, "b": False}
+    assert run(tmp_path, stages) == {"a": True, "b": True}
+    assert [s.runs for s in stages.values()] == [1, 1]
+
+
+def test_another_basis_runs_all_and_drops_the_old(tmp_path):
+    stages = {"a": Counter(1), "b": Counter(2)}
+    run(tmp_path, stages)
+    old = set(tmp_path.iterdir())
+    assert run(tmp_path, stages, "other") == {"a": False, "b": False}
+    assert len(old) == 2 and not old & set(tmp_path.iterdir())
+
+
+def test_a_stage_cut_short_is_run_again(tmp_path):
+    stages = {"a": Counter(list(range(100))), "b": Counter(2)}
+    run(tmp_path, stages)
+    damaged = next(p for p in tmp_path.iterdir() if p.name.startswith("a-"))
+    whole = damaged.read_bytes()
+    for broken in (whole[:-1], whole[:40], b"", whole[:50] + b"x" + whole[51:]):
+        damaged.write_bytes(broken)
+        assert run(tmp_path, stages) == {"a": False, "b": True}
+        assert damaged.read_bytes() == whole
+
+
+def test_results_of_stages_come_back_as_they_were(tmp_path):
+    camera = Camera("PINHOLE", 4, 3, (5.0, 5.0, 2.0, 1.5))
+    cloud = Cloud(np.arange(6.0).reshape(2, 3), np.eye(3)[:2], np.ones((2, 3), np.uint8))
+    capture = Capture("c", (View("v", Path("v.jpg"), camera, np.eye(4)),), cloud, Scale(millimetres_per_unit=1000))
+    hole = Polygon([(0, 0), (9, 0), (9, 9)], [[(5, 1), (6, 2), (6, 1)]])
+    idx = np.arange(2)
+    sheet = Sheet("s", np.eye(4), Quantity(value=18), True, hole, idx, idx, idx)
+    plane = Primitive("plane", np.eye(3)[0], 1.0, idx, np.zeros(3), 0.1)
+    parts = Parts((sheet,), (plane,), 0.1, ("a note",), {"gap": np.float64(0)})
+    stages = {"capture": Counter(capture), "identify": Counter(parts)}
+    run(tmp_path, stages)
+    again = StageCache(tmp_path, lambda: "b")
+    back = again.get("capture", ("path",), stages["capture"])[0]
+    found = again.get("identify", ("capture",), stages["identify"])[0]
+    assert [s.runs for s in stages.values()] == [1, 1]
+    assert (back.cloud.points == cloud.points).all() and back.cloud.colours.dtype == np.uint8
+    assert back.views[0].camera == camera and back.views[0].path == Path("v.jpg") and back.scale == capture.scale
+    assert found.sheets[0].region.equals_exact(hole, 0) and found.sheets[0].thickness == sheet.thickness
+    assert (found.primitives[0].point_idx == idx).all() and found.selection == {"gap": 0}
+
+
+@pytest.mark.parametrize("what", [os.system, subprocess.Popen, eval, os.unlink])
+def test_a_stranger_s_cache_cannot_run_anything(tmp_path, what):
+    class Evil:
+        def __reduce__(self):
+            return what, ("true",)
+
+    run(tmp_path, {"a": Counter(1)})
+    entry = next(iter(tmp_path.iterdir()))
+    body = pickle.dumps(Evil(), 5)
+    entry.write_bytes(cache_module.hashlib.sha256(body).digest() + body)
+    with pytest.raises(OutputError, match="delete the folder"):
+        run(tmp_path, {"a": Counter(1)})
+
+
+def test_only_classes_of_ours_can_be_named():
+    body = b"\x80\x05\x8c\x14kerfwright.supervise\x8c\x0asupervised\x93."
+    with pytest.raises(OutputError, match="supervised"):
+        cache_module._Unpickler(cache_module.io.BytesIO(body)).load()
+
+
+def test_a_full_disk_is_a_clear_error_and_leaves_no_half_result(tmp_path, monkeypatch):
+    def full(path, data):
+        path.open("wb").write(data[:10])
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OutputError, match=r"No space left.*free some space"):
+        run(tmp_path, {"a": Counter(1)})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_a_folder_nothing_is_kept():
+    stage = Counter(1)
+    assert StageCache(None).get("a", ("path",), stage) == (1, False)
+
+
+def test_folder_hash_sees_content_names_and_nothing_else(tmp_path):
+    (tmp_path / "images").mkdir()
+    (tmp_path / "images" / "a.jpg").write_bytes(b"a")
+    first = folder_hash(tmp_path)
+    os.utime(tmp_path / "images" / "a.jpg", (1, 1))
+    (tmp_path / ".DS_Store").write_bytes(b"x")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "model.json").write_bytes(b"x")
+    assert folder_hash(tmp_path, leave_out=tmp_path / "out") == first
+    seen = {first, folder_hash(tmp_path)}
+    (tmp_path / "out" / "model.json").unlink()
+    (tmp_path / "images" / "a.jpg").write_bytes(b"b")
+    seen.add(folder_hash(tmp_path))
+    (tmp_path / "images" / "a.jpg").rename(tmp_path / "images" / "b.jpg")
+    seen.add(folder_hash(tmp_path))
+    assert len(seen) == 4
+
+
+def test_the_program_s_hash_is_the_same_in_every_process():
+    script = "from kerfwright.cache import program_hash; print(program_hash())"
+    other = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env={"PYTHONHASHSEED": "7"})
+    assert other.stdout.strip() == program_hash()
