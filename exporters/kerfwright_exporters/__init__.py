@@ -1,7 +1,7 @@
 """What other programs read: one module a format, found by the entry points of the group `kerfwright.exporters`.
 
-An exporter is a function `export(model, out_dir, options) -> list[Path]`. A package of your own adds a format by an entry
-point of that group.
+An exporter is a function `export(model, out_dir, options) -> list[Path]`. A package of your own adds a format by an
+entry point of that group.
 """
 
 from __future__ import annotations

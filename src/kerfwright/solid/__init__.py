@@ -8,10 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from kerfwright.solid.build import assembly_solids, board_face, board_solid
+    from kerfwright.solid.checker import CheckOptions, check
 
-__all__ = ["assembly_solids", "board_face", "board_solid"]
+__all__ = ["CheckOptions", "assembly_solids", "board_face", "board_solid", "check"]
 
-_HOME = {"assembly_solids": "build", "board_face": "build", "board_solid": "build"}
+_HOME = {
+    "CheckOptions": "checker",
+    "assembly_solids": "build",
+    "board_face": "build",
+    "board_solid": "build",
+    "check": "checker",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -75,8 +75,8 @@ def _stretch(board: Board, index: int) -> _Stretch:
     first, last = (_edge_at(board, p, ends) for p in ends)
     if first is None or last is None:
         raise ModelError(
-            f"board {board.name!r}: bevels[{index}]: stretch {bevel.start} {bevel.end} is not on a straight edge of the "
-            "outline: give two points of one"
+            f"board {board.name!r}: bevels[{index}]: stretch {bevel.start} {bevel.end} is not on a straight edge "
+            "of the outline: give two points of one"
         )
     edges = board.cut_path.outer.edges
     if (ends[1] - ends[0]) @ edge_tangents(edges[first], [0.5])[0] < 0:
@@ -150,7 +150,7 @@ def _slab(thickness: float) -> list[HalfSpace]:
 
 
 def _upright(normal: np.ndarray, point: np.ndarray, beyond: bool) -> HalfSpace:
-    """Half-space bounded by an upright plane through a point of the outline: beyond it along the normal, or before it."""
+    """Half-space bounded by an upright plane through a point: beyond it along the normal, or before it."""
     sign = 1.0 if beyond else -1.0
     n = np.array([*normal, 0.0]) * sign
     return HalfSpace(n, float(n[:2] @ point))
