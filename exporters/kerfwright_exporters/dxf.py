@@ -48,7 +48,8 @@ def new_document(options: ExportOptions) -> Any:
     import ezdxf
     from ezdxf import units
 
-    document = ezdxf.new("R2010")
+    with _no_time_stamps():
+        document = ezdxf.new("R2010")
     document.units = units.IN if options.units == "in" else units.MM
     document.header["$MEASUREMENT"] = 0 if options.units == "in" else 1
     return document
@@ -132,6 +133,7 @@ def dxf_bytes(document: Any, name: str) -> bytes:
     ExportError
         If ezdxf's audit finds a fault.
     """
+    _show_all(document)
     auditor = document.audit()
     if auditor.has_errors or auditor.has_fixes:
         faults = "; ".join(str(e.message) for e in (*auditor.errors, *auditor.fixes))
@@ -140,6 +142,17 @@ def dxf_bytes(document: Any, name: str) -> bytes:
     with _no_time_stamps():
         document.write(stream)
     return stream.getvalue().encode(document.output_encoding, errors="dxfreplace")
+
+
+def _show_all(document: Any) -> None:
+    """Let viewers open on the whole drawing."""
+    from ezdxf import bbox, zoom
+
+    space = document.modelspace()
+    box = bbox.extents(space, fast=True)
+    if box.has_data:
+        space.reset_extents(box.extmin, box.extmax)
+        zoom.window(space, box.extmin, box.extmax)
 
 
 @contextmanager

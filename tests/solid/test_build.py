@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from simple import bevel, board, hole, placed, polygon, rectangle
 
 from kerfwright.errors import ModelError
 from kerfwright.model import Arc, Bezier, Line, Loop, Model
 from kerfwright.model.geometry import path_area
 from kerfwright.solid import assembly_solids, board_solid
 from kerfwright.solid.build import solid_is_valid
+from simple import bevel, board, hole, placed, polygon, rectangle
 
 RECTANGLE = rectangle(100, 50)
 FORK = [(0, 0), (100, 0), (100, 80), (60, 80), (60, 30), (40, 30), (40, 80), (0, 80)]

@@ -4,12 +4,12 @@ import time
 
 import numpy as np
 import pytest
-from simple import bevel, board, hole, placed, polygon, rectangle, stool
 
 from kerfwright.errors import OptionError
 from kerfwright.model import Arc, Bezier, Line, Loop, Model, Quantity
 from kerfwright.model.frames import rows
 from kerfwright.solid import CheckOptions, check
+from simple import bevel, board, hole, placed, polygon, rectangle, stool
 
 
 def change(model: Model, index: int, **fields) -> Model:

@@ -1,9 +1,9 @@
 """The seven truths drawn again: volumes as in truth.step, and nothing for the checker to say."""
 
 import pytest
-from truths import AVAILABLE, truth_data, truth_model, truth_solids
 
 from kerfwright.solid import assembly_solids, check
+from truths import AVAILABLE, truth_data, truth_model, truth_solids
 
 pytestmark = pytest.mark.skipif(not AVAILABLE, reason="the captures with truth are not on this machine")
 

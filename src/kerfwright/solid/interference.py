@@ -1,7 +1,7 @@
 """Whether boards run into each other.
 
-Most pairs are told apart by the direction of a flat face of one: along it, all of the other lies ahead. Only the rest is intersected
-by OCCT, whose boolean takes 15 to 45 ms a pair, and far more where solids nearly coincide.
+Most pairs are told apart by the direction of a flat face of one: along it, all of the other lies ahead. Only the rest
+is intersected by OCCT, whose boolean takes 15 to 45 ms a pair, and far more where solids nearly coincide.
 """
 
 from __future__ import annotations
