@@ -27,7 +27,7 @@ def act(path, options):
 def final(*_):
     return Model(name="stool", findings={findings})
 
-def written(model, folder):
+def written(model, capture, folder):
     (folder / "model.json").write_text(model.model_dump_json())
 
 pipeline.STAGES = (
@@ -223,7 +223,7 @@ def stage(name, needs):
         return Model(name=name) if name == "check" else name
     return pipeline.Stage(name, name, needs, run)
 
-def written(model, folder):
+def written(model, capture, folder):
     (folder / "model.json").write_text(model.model_dump_json())
     if dies == "write":
         os.kill(os.getppid(), 9)

@@ -14,20 +14,25 @@ from pathlib import Path
 from typing import Any
 
 from kerfwright import __version__
+from kerfwright.capture.types import Capture
 from kerfwright.model import Model
 from kerfwright.model.io import write_model
 from kerfwright.progress import Reporter
 from kerfwright.report.figures import figures
+from kerfwright.report.page import report_html
 from kerfwright.versions import library_versions
 
 __all__ = ["write_results", "write_run"]
 
 
-def write_results(model: Model, folder: Path) -> None:
-    """Write model.json, report.json, model.step and parts/*.dxf."""
+def write_results(model: Model, capture: Capture, folder: Path) -> None:
+    """Write model.json, report.json, report.html, model.step and parts/*.dxf."""
     from kerfwright_exporters import export_all
+    from kerfwright_exporters.naming import board_colours
 
     write_model(model, folder / "model.json")
+    page = report_html(model, capture, board_colours(model))
+    (folder / "report.html").write_text(page, encoding="utf-8")
     _write_json(folder / "report.json", report(model))
     # To look at the files is how one finds out what is wrong with them; `force` stamps them NOT VERIFIED then.
     export_all(model, ("step", "dxf"), folder, force=True, findings=model.findings)

@@ -31,6 +31,7 @@ def _what_came_out(out: Path) -> str:
     return f"""
 The results are in {out}
 
+  report.html    what came out, to look at: open it in a browser
   model.step     the assembly        freecad {out / "model.step"}
   parts/*.dxf    a cut path a board  librecad {out / "parts"}/*.dxf
   model.json     the model, for kerfwright check and kerfwright export

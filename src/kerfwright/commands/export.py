@@ -21,11 +21,10 @@ def export(
     ] = False,
 ) -> None:
     """Write MODEL as STEP, DXF, a build123d script, cut sheets and more."""
-    from kerfwright_exporters import export_all, exporter
-
     from kerfwright.model.io import read_model
     from kerfwright.output import OutputFolder
     from kerfwright.solid import check
+    from kerfwright_exporters import export_all, exporter
 
     for name in formats:
         exporter(name)  # an unknown format is an error before anything slow

@@ -55,7 +55,7 @@ def reconstruct(
     options = ReconstructOptions(up=_axis(up), millimetres_per_unit=_positive(scale), seed=seed)
     _limit_threads(jobs)
     reporter = reporter_for(sys.stdout if as_json else sys.stderr, quiet=quiet, as_json=as_json, verbose=verbose)
-    farewell = f"Results in {out}: open model.step in FreeCAD or any CAD program, parts/*.dxf at the router."
+    farewell = f"Results in {out}: open report.html in a browser, model.step in FreeCAD or another CAD program."
     raise typer.Exit(run_reconstruct(capture, out, options, reporter, "" if quiet or as_json else farewell))
 
 
@@ -88,7 +88,7 @@ def _reconstruct_into(
 
     def fill(partial: Path) -> None:
         with reporter.stage("write", "Writing the results"):
-            write_results(found.model, partial)
+            write_results(found.model, found.capture, partial)
         write_run(reporter, partial / "run.json")
 
     found = pipeline.reconstruct(capture, options, reporter, pipeline.stage_cache(capture, options, folder))
