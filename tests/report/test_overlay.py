@@ -87,3 +87,11 @@ def test_pictures_change_only_where_boards_are():
 def test_nothing_to_draw():
     drawing = draw([], view(CAMERAS["pinhole"]))
     assert (drawing.board_idx == -1).all() and not drawing.lines.any()
+
+
+def test_boards_that_leave_the_picture_or_reach_behind_the_camera():
+    front = view(CAMERAS["pinhole"])
+    partly = draw([box("wide", (0, 0, -20), (900, 10, 20))], front)
+    assert (partly.board_idx[72:84, -1] == 0).all() and (partly.board_idx[:, 0] == -1).all()
+    around = draw([box("room", (-400, -900, -400), (400, 900, 400))], front)
+    assert (around.board_idx == 0).all()

@@ -158,7 +158,8 @@ def test_the_same_bytes_each_time(capture):
 
 PROBE = """
 <script>
-window.addEventListener("load", () => setTimeout(() => {
+const drawn = (next) => requestAnimationFrame(() => requestAnimationFrame(next));
+window.addEventListener("load", () => drawn(() => {
   const canvas = document.querySelector(".stage canvas");
   const colours = () => {
     const flat = document.createElement("canvas");
@@ -173,7 +174,7 @@ window.addEventListener("load", () => setTimeout(() => {
   const say = { first: colours() };
   const slider = document.getElementById("explode");
   slider.value = 1; slider.dispatchEvent(new Event("input"));
-  setTimeout(() => {
+  drawn(() => {
     say.exploded = colours();
     const box = canvas.getBoundingClientRect();
     const at = { clientX: box.left + box.width / 2, clientY: box.top + box.height / 2, pointerId: 1, bubbles: true };
@@ -190,8 +191,8 @@ window.addEventListener("load", () => setTimeout(() => {
     document.getElementById("blend").dispatchEvent(new Event("input"));
     say.opacity = document.querySelector(".layers img + img").style.opacity;
     document.title = JSON.stringify(say);
-  }, 1500);
-}, 300));
+  });
+}));
 </script>
 """
 

@@ -40,13 +40,18 @@ class Drawing:
 
 def draw(meshes: Sequence[BoardMesh], view: View, supersample: int = 2) -> Drawing:
     """Cast the rays of a view at the boards; `supersample` squared rays a pixel smooth the outlines."""
-    rays = _rays(view, supersample)
-    board_idx, normals = _cast(meshes, rays)
+    shape = (view.camera.height, view.camera.width)
+    drawing = Drawing(np.full(shape, -1, np.int32), np.zeros((*shape, 3), np.float32), np.zeros(shape))
+    window = _window(meshes, view)
+    board_idx, normals = _cast(meshes, _rays(view, window, supersample))
     edges = _outlines(board_idx, normals)
-    lines = edges.reshape(view.camera.height, supersample, view.camera.width, supersample).mean(axis=(1, 3))
+    height, width = (n // supersample for n in edges.shape)
+    covered = edges.reshape(height, supersample, width, supersample).mean(axis=(1, 3))
     middle = slice(supersample // 2, None, supersample)
+    drawing.board_idx[window], drawing.normals[window] = board_idx[middle, middle], normals[middle, middle]
     # One line covers about one ray in each row of the pixel's rays.
-    return Drawing(board_idx[middle, middle], normals[middle, middle], np.clip(lines * supersample, 0, 1))
+    drawing.lines[window] = np.clip(covered * supersample, 0, 1)
+    return drawing
 
 
 def shaded(photo: np.ndarray, drawing: Drawing, colours: Sequence[tuple[float, float, float]]) -> np.ndarray:
@@ -70,16 +75,28 @@ def _with_lines(picture: np.ndarray, drawing: Drawing, colour: tuple[int, int, i
     return np.round(picture * (1 - share) + np.array(colour, float) * share).astype(np.uint8)
 
 
-def _rays(view: View, supersample: int) -> np.ndarray:
-    """(height s, width s, 6) float32 origins and unit directions in world; s rays along a pixel's side."""
-    height, width = view.camera.height * supersample, view.camera.width * supersample
-    columns, rows = np.meshgrid((np.arange(width) + 0.5) / supersample, (np.arange(height) + 0.5) / supersample)
-    rays = np.empty((height * width, 6), np.float32)
+def _window(meshes: Sequence[BoardMesh], view: View) -> tuple[slice, slice]:
+    """Rows and columns that can show a board; all of them when a board reaches behind the camera."""
+    size = np.array([view.camera.width, view.camera.height])
+    low, high = np.zeros(2), size
+    if meshes:
+        pixels, depth = view.project(np.concatenate([mesh.vertices for mesh in meshes]))
+        if (depth > 0).all():
+            low, high = pixels.min(axis=0) - 2, pixels.max(axis=0) + 2
+    (left, top), (right, bottom) = np.clip(low, 0, size).astype(int), np.clip(np.ceil(high), 0, size).astype(int)
+    return slice(top, bottom), slice(left, right)
+
+
+def _rays(view: View, window: tuple[slice, slice], supersample: int) -> np.ndarray:
+    """(rows s, columns s, 6) float32 origins and unit directions in world; s rays along a pixel's side."""
+    ticks = [np.arange(w.start * supersample, w.stop * supersample) + 0.5 for w in window]
+    rows, columns = (t / supersample for t in np.meshgrid(*ticks, indexing="ij"))
+    rays = np.empty((rows.size, 6), np.float32)
     rays[:, :3] = view.centre
     xy = view.camera.undistort(np.stack([columns.ravel(), rows.ravel()], axis=1))
-    rays[:, 3:] = xy @ view.camera_from_world[:2, :3] + view.camera_from_world[2, :3]
-    rays[:, 3:] /= np.linalg.norm(rays[:, 3:], axis=1, keepdims=True)
-    return rays.reshape(height, width, 6)
+    towards = xy @ view.camera_from_world[:2, :3] + view.camera_from_world[2, :3]
+    rays[:, 3:] = towards / np.sqrt(np.einsum("ij,ij->i", towards, towards))[:, None]
+    return rays.reshape(*rows.shape, 6)
 
 
 def _cast(meshes: Sequence[BoardMesh], rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -94,7 +111,7 @@ def _cast(meshes: Sequence[BoardMesh], rays: np.ndarray) -> tuple[np.ndarray, np
     hits = scene.cast_rays(o3d.core.Tensor(rays))
     normals = hits["primitive_normals"].numpy()
     board_idx = np.where(np.isfinite(hits["t_hit"].numpy()), hits["geometry_ids"].numpy().astype(np.int32), -1)
-    normals[(normals * rays[..., 3:]).sum(-1) > 0] *= -1
+    normals[np.einsum("ijk,ijk->ij", normals, rays[..., 3:]) > 0] *= -1
     return board_idx, normals
 
 
@@ -104,6 +121,6 @@ def _outlines(board_idx: np.ndarray, normals: np.ndarray) -> np.ndarray:
     for axis in (0, 1):
         a = tuple(slice(None, -1) if k == axis else slice(None) for k in (0, 1))
         b = tuple(slice(1, None) if k == axis else slice(None) for k in (0, 1))
-        crease = (normals[a] * normals[b]).sum(-1) < _CREASE
+        crease = np.einsum("ijk,ijk->ij", normals[a], normals[b]) < _CREASE
         edges[a] |= (board_idx[a] != board_idx[b]) | (crease & (board_idx[a] >= 0))
     return edges

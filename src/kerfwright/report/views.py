@@ -12,14 +12,16 @@ from kerfwright.capture.types import View
 
 __all__ = ["best_views", "scaled"]
 
+ENOUGH_POINTS = 5000  # to tell how much of an object a photograph shows
 # Parameters of a camera model that are lengths in pixels; the others are lens distortion.
 _PIXEL_LENGTHS = frozenset(("f", "fx", "fy", "cx", "cy"))
 
 
 def best_views(views: Sequence[View], points: np.ndarray, count: int = 4) -> list[View]:
     """Views that show most of the points (N, 3), as far apart in direction as can be; in the capture's order."""
-    share = np.array([_share_shown(view, points) for view in views])
-    candidates = np.flatnonzero(share >= 0.9 * share.max(initial=0))
+    some = points[:: max(1, len(points) // ENOUGH_POINTS)]
+    share = np.array([_share_shown(view, some) for view in views])
+    candidates = np.flatnonzero((share > 0) & (share >= 0.9 * share.max(initial=0)))
     if not len(candidates):
         return []
     directions = np.array([views[k].centre - points.mean(axis=0) for k in candidates])
