@@ -1,1 +1,43 @@
+"""From an oriented cloud to the rough boards of an object (paper, Part Identification)."""
 
+from __future__ import annotations
+
+from kerfwright.capture.types import Capture
+from kerfwright.errors import StageError
+from kerfwright.identify.options import IdentifyOptions
+from kerfwright.identify.types import Parts, Primitive, Sheet
+
+__all__ = ["IdentifyOptions", "Parts", "Primitive", "Sheet", "identify"]
+
+
+def identify(capture: Capture, options: IdentifyOptions | None = None) -> Parts:
+    """Find the boards of a capture that `kerfwright.capture.prepare` has moved to the world frame.
+
+    Raises StageError when the cloud shows no plane, or no plane that could be a board.
+    """
+    from kerfwright.identify.freespace import see_through
+    from kerfwright.identify.photo_edges import Photos
+    from kerfwright.identify.primitives import find_planes, look_around
+    from kerfwright.identify.selection import gather_evidence, select_exact
+    from kerfwright.identify.sheets import join_across, to_sheet
+    from kerfwright.identify.slabs import candidate_slabs
+
+    options = options or IdentifyOptions()
+    cloud = capture.cloud
+    around = look_around(cloud, options)
+    planes = find_planes(cloud, around, options)
+    free = see_through(capture, around.spacing, max(5 * around.noise, cloud.diameter / 150))
+    slabs = candidate_slabs(capture, around, planes, free, Photos(capture), options)
+    if not slabs:
+        raise StageError("cloud: no plane has a thickness that a board could have: photograph the edges of the boards too")
+    selection = select_exact(gather_evidence(cloud, around, slabs, options), options)
+    if not selection.chosen:
+        raise StageError("cloud: no set of boards explains it: check that the cloud shows one wooden object, cropped")
+    chosen = join_across([slabs[k] for k in selection.chosen], max(4 * around.spacing, cloud.diameter / 60))
+    chosen.sort(key=lambda s: (-round(s.region.area), *s.world_from_board[:3, 3].round(3)))
+    sheets = tuple(to_sheet(f"board_{k + 1:02d}", slab, cloud, around, options) for k, slab in enumerate(chosen))
+    figures = {
+        "candidates": len(slabs), "chosen": len(selection.chosen), "objective": selection.objective,
+        "bound": selection.bound, "explained": selection.explained, "method": selection.method,
+    }
+    return Parts(sheets, tuple(planes), around.noise, selection=figures)

@@ -1,0 +1,131 @@
+"""Where an edge lies, measured in the photographs.
+
+A straight or curved edge that is roughly known in space is swept along a direction; in every photograph that shows it, colours are read
+along the sweep. Colours averaged along the edge step where the edge is, in all views at the same offset, because the edge itself is a
+curve in space: what lies beside it does not matter. Wood grain, noise and the background do not agree in this way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from kerfwright.capture.types import Capture, View
+
+__all__ = ["Photos", "SweepResult", "refine_peak", "sweep_edge"]
+
+
+class Photos:
+    """Photographs of a capture, decoded once each and kept as bytes; sampled bilinearly."""
+
+    def __init__(self, capture: Capture):
+        self.views = capture.views
+        self._pixels = lru_cache(maxsize=None)(self._read)
+
+    def _read(self, k: int) -> np.ndarray:
+        return self.views[k].image()
+
+    def colours(self, k: int, pixels: np.ndarray) -> np.ndarray:
+        """(..., 2) pixel positions to (..., 3) float32 RGB; NaN outside the photograph."""
+        import cv2
+
+        view: View = self.views[k]
+        flat = pixels.reshape(-1, 2).astype(np.float32) - 0.5  # OpenCV puts the first pixel's centre at 0
+        inside = (flat > 0).all(axis=1) & (flat[:, 0] < view.camera.width - 1) & (flat[:, 1] < view.camera.height - 1)
+        rows = 16384  # cv2.remap takes maps of less than 2**15 a side
+        padded = np.zeros((-len(flat) % rows + len(flat), 2), np.float32)
+        padded[: len(flat)] = np.where(inside[:, None], flat, 0)
+        maps = padded.reshape(-1, rows, 2)
+        out = cv2.remap(self._pixels(k), maps, None, cv2.INTER_LINEAR).reshape(-1, 3)[: len(flat)].astype(np.float32)
+        out[~inside] = np.nan
+        return out.reshape(*pixels.shape[:-1], 3)
+
+
+@dataclass(frozen=True, eq=False)
+class SweepResult:
+    """Edge strength over the offsets (mm), the best offset with its standard error, and how far it stands out."""
+
+    offsets: np.ndarray
+    strength: np.ndarray
+    best: float
+    standard_error: float
+    contrast: float  # best strength over the median strength
+    views: int
+    view_strength: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+
+def sweep_edge(
+    photos: Photos,
+    places: np.ndarray,
+    direction: np.ndarray,
+    offsets: np.ndarray,
+    visible: np.ndarray,
+    *,
+    smoothing: float = 0.4,
+    chunk: int = 10,
+) -> SweepResult | None:
+    """Sweep an edge through space and find where the photographs show it.
+
+    places (N, 3) world mm, neighbours in order along the edge; direction (3,) or (N, 3) unit; offsets (T,) mm, evenly spaced;
+    visible (V, N) bool: which view shows which place. smoothing: mm of the step detector. chunk: places averaged before the step
+    is measured. None when no view shows a whole chunk.
+    """
+    direction = np.broadcast_to(direction, places.shape)
+    grid = places[:, None, :] + offsets[None, :, None] * direction[:, None, :]
+    step = offsets[1] - offsets[0]
+    curves = []
+    for k in range(len(photos.views)):
+        own = np.flatnonzero(visible[k])
+        if len(own) >= chunk:
+            curves.extend(_view_curves(photos, k, grid[own], own, chunk, smoothing / step))
+    if not curves:
+        return None
+    return _combine(np.array([c for _, c in curves]), [k for k, _ in curves], offsets)
+
+
+def _view_curves(photos: Photos, k: int, grid: np.ndarray, own: np.ndarray, chunk: int, sigma: float) -> list[tuple[int, np.ndarray]]:
+    """Edge strength over the offsets, one curve a chunk of places, in units of the curve's own median."""
+    view = photos.views[k]
+    pixels, _ = view.project(grid.reshape(-1, 3))
+    colours = photos.colours(k, np.nan_to_num(pixels, nan=-1.0).reshape(*grid.shape[:2], 2))
+    groups = np.split(np.arange(len(own)), np.flatnonzero(np.diff(own // chunk)) + 1)
+    curves = []
+    for group in groups:
+        if len(group) < 0.7 * chunk or not np.isfinite(colours[group]).all():
+            continue
+        profile = colours[group].mean(axis=0)
+        slope = np.linalg.norm(gaussian_filter1d(profile, sigma, axis=0, order=1), axis=1)
+        curves.append((k, slope))
+    return curves
+
+
+def _combine(slopes: np.ndarray, owners: list[int], offsets: np.ndarray) -> SweepResult:
+    """Mean of the curves, each limited so that one strong background edge cannot outvote the rest."""
+    level = np.median(slopes)
+    limited = np.minimum(slopes / max(level, 1e-6), 12.0)
+    strength = limited.mean(axis=0)
+    inner = slice(2, len(offsets) - 2)
+    k = 2 + int(np.argmax(strength[inner]))
+    best = float(offsets[k] + refine_peak(strength[k - 1 : k + 2]) * (offsets[1] - offsets[0]))
+    error = _standard_error(limited, owners, k, offsets)
+    return SweepResult(offsets, strength, best, error, float(strength[k] / np.median(strength)), len(set(owners)))
+
+
+def refine_peak(y: np.ndarray) -> float:
+    """Vertex of the parabola through three samples, in steps from the middle one, within one step."""
+    bend = y[0] - 2 * y[1] + y[2]
+    return float(np.clip((y[0] - y[2]) / (2 * bend), -1, 1)) if bend < 0 else 0.0
+
+
+def _standard_error(curves: np.ndarray, owners: list[int], k: int, offsets: np.ndarray, reach: float = 1.5) -> float:
+    """Scatter of the views' own peaks about the common one, over the root of their number."""
+    near = np.abs(offsets - offsets[k]) <= reach
+    peaks = []
+    for owner in sorted(set(owners)):
+        mean = curves[[o == owner for o in owners]].mean(axis=0)
+        peaks.append(offsets[near][np.argmax(mean[near])])
+    spread = 1.4826 * np.median(np.abs(np.array(peaks) - np.median(peaks)))
+    return float(max(spread, 0.3 * (offsets[1] - offsets[0])) / np.sqrt(len(peaks))) if len(peaks) > 1 else reach / 2

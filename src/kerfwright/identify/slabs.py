@@ -1,0 +1,308 @@
+"""Candidate boards: every plane that could be a sheet plane, with every thickness that the cloud supports.
+
+Paper, Cut Region Approximation and Initial Sheet Thickness Estimation. A candidate is the slab below a plane, inside the region
+that points on its two sheet planes cover.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+from shapely.geometry import Polygon
+
+from kerfwright.capture.types import Capture
+from kerfwright.identify.freespace import FreeSpace
+from kerfwright.identify.options import IdentifyOptions
+from kerfwright.identify.photo_edges import Photos
+from kerfwright.identify.primitives import Neighbourhood
+from kerfwright.identify.regions import Raster, occupancy, polygons
+from kerfwright.identify.rims import trace_rim
+from kerfwright.identify.thickness import ThicknessHypothesis, from_cut_faces, from_opposite, from_photos, sharpened
+from kerfwright.identify.types import Primitive
+
+__all__ = ["Slab", "candidate_slabs", "footprint", "plane_frame"]
+
+
+_Seed = tuple[tuple[int, ...], np.ndarray, Polygon]  # coplanar patches, world_from_top frame, region
+
+
+@dataclass(frozen=True, eq=False)
+class Slab:
+    """A candidate board; x_in_world = world_from_board @ x_in_board, sheet planes z = 0 and z = thickness."""
+
+    world_from_board: np.ndarray
+    thickness: ThicknessHypothesis
+    region: Polygon
+    top: tuple[int, ...]  # primitives on z = thickness
+    bottom: tuple[int, ...]
+    free_share: float  # share of the interior that cameras saw through
+
+    @property
+    def normal(self) -> np.ndarray:
+        """Unit normal of the top sheet plane, world."""
+        return self.world_from_board[:3, 2]
+
+    @property
+    def volume(self) -> float:
+        """mm3."""
+        return self.region.area * self.thickness.value
+
+    @property
+    def cut_ratio(self) -> float:
+        """Cut surface over cut region area; the perimeters of holes count."""
+        return self.region.length * self.thickness.value / self.region.area
+
+    def to_board(self, x: np.ndarray) -> np.ndarray:
+        """(N, 3) world to board frame."""
+        return (x - self.world_from_board[:3, 3]) @ self.world_from_board[:3, :3]
+
+    def to_world(self, x: np.ndarray) -> np.ndarray:
+        """(N, 3) board frame to world."""
+        return x @ self.world_from_board[:3, :3].T + self.world_from_board[:3, 3]
+
+
+def plane_frame(normal: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """4x4 frame with +z along the normal, +y as near to world up as it can be (world +y for level planes)."""
+    up = np.array([0.0, 0, 1]) if abs(normal[2]) < 0.9 else np.array([0.0, 1, 0])
+    x = np.cross(up, normal)
+    x /= np.linalg.norm(x)
+    frame = np.eye(4)
+    frame[:3, :3] = np.stack([x, np.cross(normal, x), normal], axis=1)
+    frame[:3, 3] = point
+    return frame
+
+
+def candidate_slabs(
+    capture: Capture, around: Neighbourhood, planes: list[Primitive], free: FreeSpace, photos: Photos, options: IdentifyOptions
+) -> list[Slab]:
+    """All candidates that are neither too thick for their region nor seen through, in the order of their planes."""
+    scene = _Scene(capture, around, planes, free, options, photos)
+    seeds = [seed for number in range(len(planes)) for seed in _seeds(scene, number)]
+    known = [(seed, _hypotheses(scene, seed[1], seed[2])) for seed in seeds]
+    stock = _common(known)
+    found = [slab for seed, hypotheses in known for h in hypotheses for slab in _slabs(scene, *seed, h)]
+    found = [slab for slab in found if slab.thickness.evidence != "cut" or scene.is_broad(slab.region)]
+    for seed, hypotheses in known:
+        if not hypotheses and scene.is_broad(seed[2]):
+            rough = [slab for h in stock for slab in _slabs(scene, *seed, h)]
+            found.extend(piece for slab in rough for piece in _without_others(scene, slab, found))
+    return _distinct(found)
+
+
+def _without_others(scene: _Scene, slab: Slab, others: list[Slab]) -> list[Slab]:
+    """What is left of a slab of unseen thickness once boards with evidence of their own are taken out of it.
+
+    The front edges of a bookcase lie in one plane with a rail between its sides; only the rail is a board there.
+    """
+    left = slab.region
+    for other in others:
+        if other.thickness.evidence in ("opposite", "photos") and abs(other.normal @ slab.normal) < 0.9:
+            left = left.difference(footprint(other, slab).buffer(scene.fringe, join_style="mitre"))
+    pieces = [p for p in getattr(left, "geoms", [left]) if p.area > scene.min_area]
+    return [replace(slab, region=Polygon(p.exterior, p.interiors)) for p in pieces if scene.is_broad(p)]
+
+
+def footprint(other: Slab, slab: Slab) -> Polygon:
+    """Convex outline of the other board's section through the middle of a slab, in the slab's frame."""
+    rings = np.asarray(other.region.exterior.coords)
+    ends = [slab.to_board(other.to_world(np.c_[rings, np.full(len(rings), z)])) for z in (0.0, other.thickness.value)]
+    low, high = 0.0, slab.thickness.value
+    points = []
+    for corners in ends:
+        ahead = np.roll(corners, -1, axis=0)
+        for level in (low + 0.25 * (high - low), high - 0.25 * (high - low)):
+            share = (level - corners[:, 2]) / np.where(np.abs(ahead[:, 2] - corners[:, 2]) < 1e-9, np.nan, ahead[:, 2] - corners[:, 2])
+            cross = (share >= 0) & (share <= 1)
+            points.append((corners + share[:, None] * (ahead - corners))[cross, :2])
+    crossing = np.concatenate(points)
+    return shapely.MultiPoint(crossing).convex_hull if len(crossing) > 2 else Polygon()
+
+
+def _common(known: list[tuple[_Seed, list[ThicknessHypothesis]]], most: int = 2) -> list[ThicknessHypothesis]:
+    """The thicknesses that most of the object's sheet area has, for boards that show neither their back nor a cut face."""
+    pairs = [(h[0].value, seed[2].area) for seed, h in known if h and h[0].evidence in ("opposite", "photos")]
+    values, area = np.array(pairs).reshape(-1, 2).T
+    found: list[ThicknessHypothesis] = []
+    while len(values) and len(found) < most:
+        near = np.abs(values[:, None] - values[None]) < 0.08 * values[:, None]
+        best = near[int(np.argmax(near @ area))]
+        value = float(np.median(values[best]))
+        found.append(ThicknessHypothesis(value, 0.4 * value, "inferred", float(area[best].sum())))
+        values, area = values[~best], area[~best]
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    capture: Capture
+    around: Neighbourhood
+    planes: list[Primitive]
+    free: FreeSpace
+    options: IdentifyOptions
+    photos: Photos
+
+    @property
+    def diameter(self) -> float:
+        return self.capture.cloud.diameter
+
+    @property
+    def min_area(self) -> float:
+        return (self.options.min_sheet_side * self.diameter) ** 2
+
+    def is_broad(self, piece: Polygon) -> bool:
+        """Whether most of a region is as wide as a board of unseen thickness must be: a frame of front edges is not."""
+        reach = self.options.min_unseen_side * self.diameter / 2
+        return piece.buffer(-reach).buffer(reach).area > 0.5 * piece.area
+
+    @property
+    def fringe(self) -> float:
+        """How far stereo may widen a silhouette, mm."""
+        return max(4 * self.around.spacing, self.diameter / 60)
+
+    @property
+    def rim_spacing(self) -> float:
+        return self.diameter / 400
+
+    @property
+    def cell(self) -> float:
+        return max(1.5 * self.around.spacing, self.diameter / 400)
+
+    def coplanar(self, normal: np.ndarray, point: np.ndarray) -> tuple[int, ...]:
+        """Primitives on the plane through `point` that face along `normal`."""
+        tolerance = 3 * max(self.options.inlier_sigmas * self.around.noise, self.options.inlier_floor * self.diameter) / 2
+        cos = np.cos(np.radians(self.options.opposite_degrees))
+        return tuple(
+            k for k, p in enumerate(self.planes) if p.normal @ normal > cos and abs((p.centroid - point) @ normal) < tolerance
+        )
+
+    def points(self, numbers: tuple[int, ...]) -> np.ndarray:
+        idx = np.concatenate([self.planes[k].point_idx for k in numbers]) if numbers else np.zeros(0, int)
+        return self.capture.cloud.points[idx]
+
+
+def _seeds(scene: _Scene, number: int) -> list[_Seed]:
+    """Connected regions of one plane patch that are large enough to be a board's."""
+    plane = scene.planes[number]
+    if len(plane.point_idx) * scene.around.spacing**2 < 0.25 * scene.min_area:
+        return []
+    frame = plane_frame(plane.normal, plane.centroid)
+    top = scene.coplanar(plane.normal, plane.centroid)
+    own = (scene.capture.cloud.points[plane.point_idx] - plane.centroid) @ frame[:3, :3]
+    raster = Raster.around(own[:, :2], scene.cell)
+    pieces = polygons(raster, occupancy(raster, own[:, :2]), scene.min_area, 4 * scene.cell**2)
+    return [(top, frame, piece) for piece in pieces]
+
+
+def _hypotheses(scene: _Scene, frame: np.ndarray, piece: Polygon) -> list[ThicknessHypothesis]:
+    """Thicknesses that opposite planes, photographs, the ground or cut faces support, best evidence first."""
+    low, high = scene.options.min_thickness * scene.diameter, scene.options.max_thickness * scene.diameter
+    cloud, around = scene.capture.cloud, scene.around
+    opposite = from_opposite(frame, piece, scene.planes, cloud.points, (low, high), scene.options.opposite_degrees)
+    rim = trace_rim(frame, piece, cloud, around, scene.diameter / 40, spacing=scene.rim_spacing, width=scene.fringe)
+    photos = from_photos(frame, rim, scene.photos, (low, high), step=scene.diameter * scene.options.sweep_step)
+    found = [sharpened(h, photos) for h in opposite] or [p for p in photos[:2] if p.support > max(3.3, 0.7 * photos[0].support)]
+    if not found and not scene.photos.views:
+        found = from_cut_faces(frame, piece, cloud, around, (low, high))
+    height = frame[2, 3]
+    if frame[2, 2] > 0.999 and low < height < high and not any(h.near(height) for h in found):
+        found.append(ThicknessHypothesis(float(height), 2 * around.noise, "ground", piece.area))
+    return found
+
+
+def _slabs(
+    scene: _Scene, top: tuple[int, ...], frame: np.ndarray, seed: Polygon, thickness: ThicknessHypothesis
+) -> list[Slab]:
+    """The slab's pieces that touch the seed region: points of both sheet planes, see-through places taken out."""
+    bottom_point = frame[:3, 3] - thickness.value * frame[:3, 2]
+    bottom = scene.coplanar(-frame[:3, 2], bottom_point)
+    sides = [(scene.points(side) - frame[:3, 3]) @ frame[:3, :3] for side in (top, bottom)]
+    raster = Raster.around(np.concatenate(sides)[:, :2], scene.cell)
+    wood = np.zeros(raster.shape, bool)
+    for side in sides:
+        if len(side):
+            wood |= occupancy(raster, side[:, :2])
+    board = frame.copy()
+    board[:3, 3] = bottom_point
+    slabs = []
+    for piece in polygons(raster, wood, scene.min_area, 4 * scene.cell**2):
+        if piece.intersection(seed).area < 0.5 * seed.area:
+            continue
+        piece = _fill_unseen_holes(scene, board, thickness.value, piece)
+        slab = Slab(board, thickness, piece, top, bottom, _free_share(scene, board, thickness.value, piece))
+        if slab.cut_ratio <= scene.options.cut_area_ratio and slab.free_share <= scene.options.max_free:
+            slabs.append(slab)
+    return slabs
+
+
+def _fill_unseen_holes(scene: _Scene, board: np.ndarray, thickness: float, piece: Polygon) -> Polygon:
+    """Close the holes that nothing proves: neither seen through nor lined by cut faces that face into them."""
+    kept = [ring for ring in piece.interiors if _hole_is_real(scene, board, thickness, Polygon(ring))]
+    return Polygon(piece.exterior, kept)
+
+
+def _hole_is_real(scene: _Scene, board: np.ndarray, thickness: float, hole: Polygon) -> bool:
+    inner = hole.buffer(-scene.cell)
+    if inner.is_empty:
+        return False
+    sites = _sites(inner, board, np.array([thickness / 2]), 200)
+    if (scene.free.votes(sites) >= 2).mean() > 0.5:
+        return True
+    cloud = scene.capture.cloud
+    x = (cloud.points - board[:3, 3]) @ board[:3, :3]
+    low, high = np.array(hole.bounds).reshape(2, 2)
+    margin = 2 * scene.cell
+    near = np.flatnonzero(((x[:, :2] > low - margin) & (x[:, :2] < high + margin)).all(axis=1) & (x[:, 2] > 0) & (x[:, 2] < thickness))
+    normal = scene.around.normals[near] @ board[:3, :3]
+    rim = near[np.abs(normal[:, 2]) < 0.5]
+    if not len(rim):
+        return False
+    inward = np.array(hole.centroid.coords[0]) - x[rim, :2]
+    facing = (scene.around.normals[rim] @ board[:3, :2] * inward).sum(axis=1) > 0
+    band = shapely.distance(hole.exterior, shapely.points(x[rim, :2])) < margin
+    return float((facing & band).sum()) * scene.around.spacing**2 > 0.3 * hole.length * thickness
+
+
+def _sites(region: Polygon, board: np.ndarray, heights: np.ndarray, count: int) -> np.ndarray:
+    """About `count` places on a grid inside the region, at each height, in world."""
+    step = np.sqrt(region.area * len(heights) / count)
+    low_x, low_y, high_x, high_y = region.bounds
+    x, y = np.meshgrid(np.arange(low_x + step / 2, high_x, step), np.arange(low_y + step / 2, high_y, step))
+    inside = shapely.contains_xy(region, x.ravel(), y.ravel())
+    xy = np.stack([x.ravel(), y.ravel()], axis=1)[inside]
+    places = np.concatenate([np.c_[xy, np.full(len(xy), z)] for z in heights]) if len(xy) else np.zeros((0, 3))
+    return places @ board[:3, :3].T + board[:3, 3]
+
+
+def _free_share(scene: _Scene, board: np.ndarray, thickness: float, piece: Polygon) -> float:
+    inner = piece.buffer(-min(2 * scene.cell, thickness / 3))
+    if inner.is_empty:
+        return 0.0
+    heights = thickness * np.linspace(0.15, 0.85, 5)
+    sites = _sites(inner, board, heights, scene.options.free_sites)
+    return float((scene.free.votes(sites) >= 2).mean()) if len(sites) else 0.0
+
+
+def _distinct(slabs: list[Slab]) -> list[Slab]:
+    """Drop a slab that says the same as an earlier one: the other side's view of the same board."""
+    kept: list[Slab] = []
+    for slab in slabs:
+        if not any(_same(slab, other) for other in kept):
+            kept.append(slab)
+    return kept
+
+
+def _same(a: Slab, b: Slab) -> bool:
+    """Whether two slabs share their sheet planes and nearly all of their region."""
+    if abs(a.world_from_board[:3, 2] @ b.world_from_board[:3, 2]) < 0.998:
+        return False
+    if abs(a.thickness.value - b.thickness.value) > 0.15 * b.thickness.value:
+        return False
+    rings = np.asarray(a.region.exterior.coords)
+    moved = b.to_board(a.to_world(np.c_[rings, np.full(len(rings), a.thickness.value / 2)]))
+    if abs(np.median(moved[:, 2]) - b.thickness.value / 2) > 0.25 * b.thickness.value:
+        return False
+    outline = Polygon(moved[:, :2]).buffer(0)
+    other = Polygon(b.region.exterior).buffer(0)
+    return outline.intersection(other).area > 0.85 * outline.union(other).area
