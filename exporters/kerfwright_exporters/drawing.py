@@ -15,7 +15,9 @@ from kerfwright.model import Board, CutPath, Loop
 from kerfwright.model.arcs import arc_path
 from kerfwright.model.geometry import path_polygon, transform_loop
 from kerfwright_exporters.naming import STAMP, ascii_name
+from kerfwright_exporters.offset import offset_loop
 from kerfwright_exporters.options import ExportOptions
+from kerfwright_exporters.relief import relieved_path
 
 if TYPE_CHECKING:
     from shapely.geometry import Polygon
@@ -30,7 +32,7 @@ TEXT_HEIGHTS = (12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5)  # mm, the l
 class Cut:
     """A closed loop to cut through; `depth` is the board's thickness, mm."""
 
-    operation: Literal["inside", "outside"]
+    operation: Literal["inside", "outside", "inside_kerf", "outside_kerf"]
     loop: Loop
     depth: float
 
@@ -68,14 +70,23 @@ def board_drawing(board: Board, options: ExportOptions) -> Drawing:
     """The board's drawing in its own frame."""
     path = cutting_path(board, options)
     depth = board.thickness.value
-    cuts = (*(Cut("inside", hole, depth) for hole in path.holes), Cut("outside", path.outer, depth))
+    cuts = [*(Cut("inside", hole, depth) for hole in path.holes), Cut("outside", path.outer, depth)]
+    if options.kerf:
+        cuts = [c for cut in cuts for c in (cut, _tool_path(cut, options.kerf / 2, board.name))]
     bevels = tuple(BevelLine(b.start, b.end, b.angle.value) for b in board.bevels)
-    return Drawing(cuts, bevels, tuple(_texts(board, path, bevels, options)))
+    return Drawing(tuple(cuts), bevels, tuple(_texts(board, path, bevels, options)))
 
 
 def cutting_path(board: Board, options: ExportOptions) -> CutPath:
-    """The cut path as the files carry it: Beziers as arcs unless splines were asked for."""
-    return board.cut_path if options.splines else arc_path(board.cut_path, options.arc_tolerance)
+    """The cut path as the files carry it: reliefs as asked for, Beziers as arcs unless splines were asked for."""
+    path = board.cut_path if options.splines else arc_path(board.cut_path, options.arc_tolerance)
+    if options.relief == "none":
+        return path
+    return relieved_path(path, options.relief, options.tool_diameter, board.name)
+
+
+def _tool_path(cut: Cut, distance: float, name: str) -> Cut:
+    return Cut(f"{cut.operation}_kerf", offset_loop(cut.loop, distance, name), cut.depth)
 
 
 def _texts(board: Board, path: CutPath, bevels: tuple[BevelLine, ...], options: ExportOptions) -> Iterator[Text]:

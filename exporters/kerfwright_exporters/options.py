@@ -26,13 +26,20 @@ class ExportOptions:
     arc_tolerance: float = 0.05  # how far the arcs that stand for a Bezier may stray from it
     splines: bool = False  # write Beziers as splines, not as arcs
     layers: Literal["plain", "depth", "numbered"] = "plain"  # how DXF and SVG call their layers
+    kerf: float = 0.0  # width of the cut; above 0 the path of the tool's centre is drawn beside the original
+    relief: Literal["none", "dogbone", "tbone"] = "none"  # in inside corners
+    tool_diameter: float = 6.0  # of the bit that makes the relief
     mesh_tolerance: float = 0.1  # chord error of triangle meshes
 
     def __post_init__(self) -> None:
         self._choose("units", "mm", "in")
         self._choose("layers", "plain", "depth", "numbered")
-        for name in ("arc_tolerance", "mesh_tolerance"):
+        self._choose("relief", "none", "dogbone", "tbone")
+        for name in ("arc_tolerance", "mesh_tolerance", "tool_diameter"):
             self._require(name, 0.0, inclusive=False)
+        self._require("kerf", 0.0)
+        if self.kerf and self.splines:
+            raise OptionError("splines: True: a spline has no exact path beside it: give either kerf or splines")
 
     def _choose(self, name: str, *choices: str) -> None:
         if getattr(self, name) not in choices:
