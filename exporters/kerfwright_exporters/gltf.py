@@ -65,7 +65,9 @@ def _document(model: Model, options: ExportOptions) -> dict[str, Any]:
 
 def _mesh(solid: build123d.Solid, tolerance: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Vertices, normals (N, 3) float32 and triangles (M, 3) uint32; no vertex belongs to two faces of the solid."""
-    solid.mesh(tolerance, 0.2)
+    from OCP.BRepMesh import BRepMesh_IncrementalMesh
+
+    BRepMesh_IncrementalMesh(solid.wrapped, tolerance, False, 0.2)  # not relative to the edges' sizes
     parts = [_face(face) for face in solid.faces()]
     shifts = np.cumsum([0, *(len(p) for p, _, _ in parts)])[:-1]
     points = np.concatenate([p for p, _, _ in parts]).astype(np.float32)
