@@ -19,7 +19,7 @@ from typing import Any
 from kerfwright.errors import CaptureError, OutputError
 from kerfwright.versions import library_versions
 
-__all__ = ["NO_CACHE", "StageCache", "folder_hash", "program_hash"]
+__all__ = ["NO_CACHE", "StageCache", "folder_hash", "program_hash", "read_kept"]
 
 # What unpickling may call besides kerfwright's own classes: builders of arrays and of polygons, and plain values.
 _ALLOWED = frozenset((
@@ -90,6 +90,13 @@ class StageCache:
 
 
 NO_CACHE = StageCache(None)
+
+
+def read_kept(folder: Path, name: str) -> Any:
+    """The newest result of stage `name` in a cache folder, whatever its key; None when there is none that is whole."""
+    paths = sorted(folder.glob(f"{name}-*"), key=lambda p: (p.stat().st_mtime_ns, p.name), reverse=True)
+    kept = next((found for p in paths if p.suffix != ".partial" and (found := _read(p)) is not None), None)
+    return None if kept is None else kept[0]
 
 
 def _read(path: Path) -> tuple[Any] | None:

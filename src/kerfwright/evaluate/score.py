@@ -1,0 +1,176 @@
+"""Score a model against the truth."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from kerfwright.evaluate.figures import GOOD, board_figures, match_boards, shown_boards, surface_figures
+from kerfwright.evaluate.nodes import compare_nodes
+from kerfwright.evaluate.stages import stage_model
+from kerfwright.evaluate.surfaces import Body, Mesh
+from kerfwright.evaluate.touching import Touch, compare_touches, touching_pairs
+from kerfwright.evaluate.truth import Truth, read_truth
+from kerfwright.model import Model
+
+__all__ = ["evaluate", "evaluate_model"]
+
+HIDDEN = 50  # cloud points below which nobody could have seen the board
+TESSELLATION = 0.2  # mm and radians, of curved faces
+NEAR_SHARE = 0.03  # of D: cloud points further away are not the object's
+
+
+def evaluate(model_dir: Path | str, truth_dir: Path | str, stage: str | None = None) -> dict[str, object]:
+    """Figures of an output folder against a truth folder; keys as ../shared/tools/score.py names them, and more.
+
+    Parameters
+    ----------
+    model_dir : Path
+        Holds model.json; for an earlier stage, its .cache too.
+    truth_dir : Path
+        Holds truth.json and frame.json; cloud.ply lies beside it.
+    stage : {"identify", "assemble", "refine"}, optional
+        Score what was known after that stage. Contacts of "assemble" are those it lists; rough boards don't touch.
+
+    Raises
+    ------
+    KerfwrightError
+        If either folder lacks what it should hold.
+    """
+    model, truth = stage_model(Path(model_dir), stage), read_truth(Path(truth_dir))
+    return evaluate_model(model, truth, listed_contacts=stage == "assemble")
+
+
+def evaluate_model(model: Model, truth: Truth, listed_contacts: bool = False) -> dict[str, object]:
+    """The same for a model and a truth in memory.
+
+    Parameters
+    ----------
+    listed_contacts : bool
+        Count the contacts that the model lists, not those that its surfaces make.
+    """
+    solids = _solids(model)
+    truth_from_model = np.linalg.inv(truth.capture_from_truth) @ np.array(model.capture_from_model)
+    found = [_moved(truth_from_model, _mesh(solid)) for _, solid in solids]
+    true = [board.mesh for board in truth.boards]
+    if not found:
+        return _nothing(truth)
+    overlap, match = match_boards(true, found)
+    touches, pairs = _touches(model, truth, found, match, listed_contacts)
+    want = touching_pairs(true, [b.normal for b in truth.boards])
+    out = {**_part_figures(model, truth, overlap, match), **surface_figures(true, found, truth.cloud)}
+    out |= compare_touches(want, touches, [b.name for b in truth.boards]) | {"contacts_found": pairs}
+    out["boards"] = _boards(model, truth, found, overlap, match, truth_from_model)
+    out |= _node_sums(out["boards"]) | _solid_figures(solids, truth_from_model)
+    return out if truth.cloud is None else out | _seen_figures(truth, overlap, match, want, touches, out["boards"])
+
+
+def _solids(model: Model) -> list:
+    from kerfwright.solid import assembly_solids
+
+    return assembly_solids(model)
+
+
+def _mesh(solid) -> Mesh:
+    vertices, triangles = solid.tessellate(TESSELLATION, TESSELLATION)
+    return np.array([tuple(v) for v in vertices], float), np.array(triangles, int)
+
+
+def _moved(target_from_source: np.ndarray, mesh: Mesh) -> Mesh:
+    return mesh[0] @ target_from_source[:3, :3].T + target_from_source[:3, 3], mesh[1]
+
+
+def _nothing(truth: Truth) -> dict[str, object]:
+    """No boards, no figures."""
+    names = [b.name for b in truth.boards]
+    return {"object": truth.name, "parts_true": len(names), "parts_found": 0, "parts_matched": 0, "missing": names}
+
+
+def _part_figures(model: Model, truth: Truth, overlap: np.ndarray, match: dict[int, int]) -> dict[str, object]:
+    matched = [overlap[i, j] for i, j in match.items()]
+    return {
+        "object": truth.name,
+        "parts_true": len(truth.boards),
+        "parts_found": len(model.boards),
+        "parts_matched": len(match),
+        "parts_good": sum(bool(v > GOOD) for v in matched),
+        "mean_iou": float(np.mean(matched)) if matched else 0.0,
+        "missing": [b.name for i, b in enumerate(truth.boards) if i not in match],
+        "extra": [b.name for j, b in enumerate(model.boards) if j not in match.values()],
+    }
+
+
+def _touches(
+    model: Model, truth: Truth, found: list[Mesh], match: dict[int, int], listed: bool
+) -> tuple[dict[tuple[int, int], Touch], int]:
+    """What touches, by indices of the true boards, and how many pairs of the model's boards do."""
+    back = {j: i for i, j in match.items()}
+    normals = [truth.boards[back[j]].normal if j in back else np.zeros(3) for j in range(len(found))]
+    pairs = _listed(model) if listed else touching_pairs(found, normals)
+    out = {}
+    for (a, b), touch in pairs.items():
+        if a in back and b in back:
+            p, q = back[a], back[b]
+            out[min(p, q), max(p, q)] = touch if p < q else touch.swapped()
+    return out, len(pairs)
+
+
+def _listed(model: Model) -> dict[tuple[int, int], Touch]:
+    """The contacts that the model lists."""
+    index = {board.name: k for k, board in enumerate(model.boards)}
+    out = {}
+    for contact in model.contacts:
+        kinds = tuple("cut" if face == "edge" else "sheet" for face in (contact.face_a, contact.face_b))
+        a, b, touch = index[contact.a], index[contact.b], Touch(kinds, contact.area)
+        out[min(a, b), max(a, b)] = touch if a < b else touch.swapped()
+    return out
+
+
+def _boards(model: Model, truth: Truth, found: list[Mesh], overlap, match, truth_from_model) -> dict[str, dict]:
+    """Figures of every matched board, by the true board's name."""
+    out = {}
+    for i, j in sorted(match.items()):
+        own = {"board": model.boards[j].name, "iou": float(overlap[i, j]), **board_figures(truth.boards[i], found[j])}
+        nodes = compare_nodes(truth.boards[i], model.boards[j], truth_from_model)
+        out[truth.boards[i].name] = own | {"nodes": asdict(nodes)}
+    return out
+
+
+def _node_sums(boards: dict[str, dict]) -> dict[str, int]:
+    keys = ("true", "found", "right_kind", "spurious")
+    return {f"nodes_{key}": sum(b["nodes"][key] for b in boards.values()) for key in keys}
+
+
+def _solid_figures(solids: list, truth_from_model: np.ndarray) -> dict[str, object]:
+    """Shared volume of pairs of solids, mm3 of the truth, and whether OCCT finds them valid."""
+    from kerfwright.solid.faces import shape_of
+    from kerfwright.solid.interference import common_volume, near_pairs
+
+    shapes = [shape_of(name, solid) for name, solid in solids]
+    shared = sum(common_volume(a, b) for a, b in near_pairs(shapes, 0.0))
+    return {
+        "interference_mm3": float(shared * np.linalg.det(truth_from_model[:3, :3])),
+        "solids_valid": all(bool(solid.is_valid) for _, solid in solids),
+    }
+
+
+def _seen_figures(truth: Truth, overlap, match, want, touches, boards: dict[str, dict]) -> dict[str, object]:
+    """Counts without boards that nobody could have seen, and the overlap of those whose thickness shows."""
+    largest = max(np.ptp(np.concatenate([b.vertices for b in truth.boards]), axis=0))
+    own = truth.cloud[Body(*(b.mesh for b in truth.boards)).distance(truth.cloud) < NEAR_SHARE * largest]
+    counts, shown = shown_boards(truth.boards, own)
+    hidden = {k for k, n in enumerate(counts) if n < HIDDEN}
+    for i in match:
+        boards[truth.boards[i].name]["thickness_seen"] = shown[i]
+    open_ = [pair for pair in want if not hidden & set(pair)]
+    seen = [overlap[i, j] for i, j in match.items() if shown[i]]
+    return {
+        "hidden": [truth.boards[k].name for k in sorted(hidden)],
+        "parts_true_open": len(truth.boards) - len(hidden),
+        "parts_matched_open": sum(i not in hidden for i in match),
+        "contacts_true_open": len(open_),
+        "contacts_typed_right_open": sum(p in touches and touches[p].kinds == want[p].kinds for p in open_),
+        "mean_iou_seen": float(np.mean(seen)) if seen else 0.0,
+    }
