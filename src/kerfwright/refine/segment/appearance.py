@@ -1,0 +1,80 @@
+"""Colour mixtures: how likely a colour is inside and outside of a board, in one view of one side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+__all__ = ["Mixture", "fit_mixture"]
+
+FLOOR_VARIANCE = 2.0  # LAB units squared: sensor noise and JPEG; keeps flat colours from becoming spikes
+UNIFORM = np.log(1e-7)  # density of an unforeseen colour: LAB holds about 1e6 to 1e7 cubic units
+EM_STEPS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Mixture:
+    """Gaussians with full covariance in LAB."""
+
+    weights: np.ndarray  # (k,)
+    means: np.ndarray  # (k, 3)
+    whitening: np.ndarray  # (k, 3, 3), inverse Cholesky factors of the covariances
+
+    def log_density(self, colours: np.ndarray) -> np.ndarray:
+        """(N, 3) to (N,), all colours and components in one product."""
+        return np.logaddexp(_logsumexp(self._joint(colours)), UNIFORM)
+
+    def _joint(self, colours: np.ndarray) -> np.ndarray:
+        k = len(self.weights)
+        stacked = self.whitening.reshape(3 * k, 3)
+        offset = np.einsum("kij,kj->ki", self.whitening, self.means).reshape(3 * k)
+        z = colours.astype(np.float32) @ stacked.T.astype(np.float32) - offset.astype(np.float32)
+        squared = (z * z).reshape(-1, k, 3).sum(2)
+        log_det = np.log(np.abs(np.linalg.det(self.whitening)))
+        constant = np.log(self.weights) + log_det - 1.5 * np.log(2 * np.pi)
+        return constant.astype(np.float32) - 0.5 * squared
+
+
+def _logsumexp(values: np.ndarray) -> np.ndarray:
+    top = values.max(1)
+    return top + np.log(np.exp(values - top[:, None]).sum(1))
+
+
+def fit_mixture(colours: np.ndarray, components: int, samples: int, rng: np.random.Generator) -> Mixture | None:
+    """A mixture of (N, 3) colours, by k-means and a few steps of EM on a sample; None of too few colours."""
+    if len(colours) < 10 * components:
+        return None
+    picked = colours[rng.choice(len(colours), min(samples, len(colours)), replace=False)].astype(np.float32)
+    mixture = _mixture(picked, _one_hot(_nearest(picked, components)))
+    for _ in range(EM_STEPS):
+        joint = mixture._joint(picked)
+        mixture = _mixture(picked, np.exp(joint - _logsumexp(joint)[:, None]))
+    return mixture
+
+
+def _nearest(colours: np.ndarray, components: int) -> np.ndarray:
+    """k-means, from centres at the quantiles of lightness: repeatable without a random start."""
+    order = np.argsort(colours[:, 0], kind="stable")
+    centres = colours[order[((np.arange(components) + 0.5) / components * len(colours)).astype(int)]].copy()
+    labels = np.zeros(len(colours), int)
+    for _ in range(8):
+        labels = ((colours[:, None] - centres) ** 2).sum(2).argmin(1)
+        for k in np.unique(labels):
+            centres[k] = colours[labels == k].mean(0)
+    return labels
+
+
+def _one_hot(labels: np.ndarray) -> np.ndarray:
+    return (labels[:, None] == np.unique(labels)).astype(np.float32)
+
+
+def _mixture(colours: np.ndarray, shares: np.ndarray) -> Mixture:
+    """Maximum likelihood with shares (N, k) of each colour in each component; empty components go."""
+    mass = shares.sum(0)
+    shares, mass = shares[:, mass > 3], mass[mass > 3]
+    means = shares.T @ colours / mass[:, None]
+    second = np.einsum("nk,ni,nj->kij", shares, colours, colours, optimize=True) / mass[:, None, None]
+    covariance = second - means[:, :, None] * means[:, None, :] + FLOOR_VARIANCE * np.eye(3)
+    whitening = np.linalg.inv(np.linalg.cholesky(covariance.astype(np.float64)))
+    return Mixture((mass / mass.sum()).astype(np.float64), means.astype(np.float64), whitening)

@@ -1,0 +1,233 @@
+"""All boards of an object, in rounds: each round every board is cut out of the photographs with the others as the last round left them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from shapely.geometry import Polygon
+
+from kerfwright.assemble.types import ConstraintSegment
+from kerfwright.capture.types import Capture
+from kerfwright.errors import OptionError
+from kerfwright.identify.types import Sheet
+from kerfwright.refine.segment.boundary import Chain, chain_of, loops_of, registration, settle, snap
+from kerfwright.refine.segment.constraints import Limit, carve, limits_of
+from kerfwright.refine.segment.edges import EdgeScan, scan_edges
+from kerfwright.refine.segment.evidence import ViewEvidence, average, classes_on_grid, cut_face_band, gather, grown, seeds_of
+from kerfwright.refine.segment.graphcut import contrast, cut, smoothness_weights
+from kerfwright.refine.segment.grid import Grid, grid_over
+from kerfwright.refine.segment.options import BoardOutlines, SegmentOptions
+from kerfwright.refine.segment.rectify import Photos, even_out, rectify
+from kerfwright.refine.segment.scene import Occluders
+from kerfwright.refine.segment.topology import clean, pieces
+from kerfwright.refine.segment.views import BoardView, choose_views
+from kerfwright.refine.types import Outline
+
+__all__ = ["segment_boards"]
+
+CORNER_REACH = 2.0  # thicknesses over which an open corner between constraint segments is closed
+DISAGREES = 1.2  # mm that a registered view may still differ by from the others before it is left out
+LARGEST_SHIFT = 3.0  # mm; poses good to half a pixel need far less
+
+
+@dataclass(frozen=True, eq=False)
+class _Board:
+    """One board between rounds."""
+
+    idx: int
+    sheet: Sheet
+    limits: list[Limit]
+    grid: Grid
+    views: list[BoardView]
+    shifts: list[np.ndarray]  # (2,) mm a view
+    excluded: np.ndarray  # by constraint segments
+    crossing: np.ndarray
+    masks: list[np.ndarray]  # one a piece
+    regions: list[Polygon]  # the same as polygons
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def mask(self) -> np.ndarray:
+        return np.any(self.masks, axis=0)
+
+
+def segment_boards(
+    sheets: Sequence[Sheet], constraints: Sequence[Sequence[ConstraintSegment]], capture: Capture,
+    options: SegmentOptions | None = None,
+) -> list[BoardOutlines]:
+    """Outlines of all boards (paper, Joint Image-Based Segmentation).
+
+    Parameters
+    ----------
+    sheets : rough boards, world frame of `capture`, millimetres.
+    constraints : `constraints[i]` belongs to `sheets[i]`.
+    capture : prepared: +z up, floor at z = 0.
+
+    Returns
+    -------
+    One BoardOutlines a sheet, in order: one Outline a connected piece, largest first. A board that no photograph
+    shows well keeps the cloud's outline, and `fallback` says why.
+
+    Raises
+    ------
+    OptionError when there is not one list of constraints a sheet; CaptureError when a photograph cannot be read.
+    """
+    options = options or SegmentOptions()
+    if len(sheets) != len(constraints):
+        raise OptionError(f"constraints: length: {len(constraints)} for {len(sheets)} sheets: give one list a sheet")
+    photos = Photos()
+    occluders = Occluders(sheets, [[s.region] for s in sheets])
+    with ThreadPoolExecutor(max(1, options.threads)) as pool:
+        boards = list(pool.map(
+            lambda i: _begin(i, sheets[i], constraints[i], capture, occluders, options), range(len(sheets))
+        ))
+        for round_idx in range(options.rounds):
+            last = boards
+            boards = list(pool.map(
+                lambda b: _round(b, last, occluders, photos, options, round_idx), boards  # noqa: B023
+            ))
+            occluders = Occluders(sheets, [b.regions for b in boards])
+        return list(pool.map(lambda b: _finish(b, capture, occluders, photos, options), boards))
+
+
+def _begin(
+    idx: int, sheet: Sheet, constraints: Sequence[ConstraintSegment], capture: Capture, occluders: Occluders,
+    options: SegmentOptions,
+) -> _Board:
+    """A board before its first round: views, raster, constraints."""
+    views = choose_views(sheet, idx, capture.views, occluders, options) if options.use_images else []
+    densities = [v.density for v in views] or [1.0]
+    pixel = options.pixel or float(np.clip(1 / np.median(densities), options.min_pixel, options.max_pixel))
+    grid = grid_over(sheet.region, options.search_margin + 4 * pixel, pixel, options.max_grid)
+    limits = limits_of(constraints, sheet.thickness.value, CORNER_REACH * sheet.thickness.value)
+    excluded, crossing = carve(limits, grid)
+    mask = grid.mask(sheet.region)
+    shifts = [np.zeros(2) for _ in views]
+    return _Board(idx, sheet, limits, grid, views, shifts, excluded, crossing, [mask], [sheet.region])
+
+
+def _round(
+    board: _Board, boards: Sequence[_Board], occluders: Occluders, photos: Photos, options: SegmentOptions, round_idx: int
+) -> _Board:
+    """One round of a board: evidence, cut, pieces, and how far its views must be moved."""
+    if not board.views:
+        return board
+    first = round_idx == 0
+    error = options.outline_error if first else options.refined_error
+    margin = options.search_margin if first else options.outline_error
+    forbidden = board.excluded | _taken(board, boards, error)
+    seeds = seeds_of(board.mask, forbidden, error, margin, board.grid.pixel)
+    if not seeds.inside.any():
+        return replace(board, views=[], shifts=[])
+    evidences, contrasts = _evidence(board, seeds, error, occluders, photos, options)
+    if not evidences:
+        return replace(board, views=[], shifts=[])
+    weights = smoothness_weights(contrasts, board.crossing, options.smoothness)
+    mask = cut(average(evidences, seeds, error), weights, seeds.inside, seeds.outside)
+    masks = clean(mask, board.grid.pixel, options)
+    if not masks:
+        return replace(board, views=[], shifts=[])
+    board = replace(board, masks=masks, regions=[pieces(m, board.grid) for m in masks])
+    return _registered(board, occluders, photos, options)
+
+
+def _taken(board: _Board, boards: Sequence[_Board], error: float) -> np.ndarray:
+    """Pixels whose point half way through the board lies inside another board, its margin of error taken off."""
+    centres = board.grid.centres().reshape(-1, 2)
+    height = board.sheet.thickness.value / 2
+    in_world = board.sheet.to_world(np.column_stack([centres, np.full(len(centres), height)]))
+    taken = np.zeros(len(centres), bool)
+    for other in boards:
+        if other.idx == board.idx:
+            continue
+        core = grown(other.mask & ~other.excluded, -error, other.grid.pixel)
+        at = other.sheet.to_board(in_world)
+        depth = np.minimum(at[:, 2], other.sheet.thickness.value - at[:, 2])
+        near = depth > min(1.0, other.sheet.thickness.value / 8)
+        taken[near] |= other.grid.lookup(core, at[near, :2], False)
+    return taken.reshape(board.grid.shape)
+
+
+def _evidence(
+    board: _Board, seeds, error: float, occluders: Occluders, photos: Photos, options: SegmentOptions
+) -> tuple[list[ViewEvidence], np.ndarray]:
+    """Every view's evidence, and the contrast averaged over the views that see a pixel."""
+    rng = np.random.default_rng([options.seed, board.idx])
+    rectified = [rectify(photos, board.sheet, v, board.grid, s) for v, s in zip(board.views, board.shifts, strict=True)]
+    kinds = [classes_on_grid(board.sheet, board.idx, v, board.grid, occluders, error) for v in board.views]
+    cores = [seeds.inside & held & (k < 2) for (_, held), k in zip(rectified, kinds, strict=True)]
+    labs = even_out([image for image, _ in rectified], cores, [v.side for v in board.views])
+    evidences, total, count = [], 0, 1e-6
+    for view, lab, (_, held), kind, core in zip(board.views, labs, rectified, kinds, cores, strict=True):
+        band = grown(cut_face_band(board.mask, view, board.grid), error / 2, board.grid.pixel) & ~seeds.inside
+        said = gather(lab, held, kind, band, seeds, error, options, rng)
+        if said is not None:
+            evidences.append(said)
+            total = total + contrast(lab, core) * said.seen
+            count = count + said.seen
+    return evidences, total / count
+
+
+def _chain(board: _Board, k: int, options: SegmentOptions) -> Chain:
+    return chain_of(board.regions[k], options.step)
+
+
+def _scans(board: _Board, chain: Chain, occluders: Occluders, photos: Photos, options: SegmentOptions) -> list[EdgeScan]:
+    return [
+        scan_edges(chain.points, chain.normals, chain.ring, board.sheet, board.idx, view, photos, occluders,
+                   board.mask, board.grid, shift, options.reach)
+        for view, shift in zip(board.views, board.shifts, strict=True)
+    ]
+
+
+def _registered(board: _Board, occluders: Occluders, photos: Photos, options: SegmentOptions) -> _Board:
+    """Views that disagree with the others are moved to them, or left out."""
+    if len(board.views) < 3:
+        return board
+    chain = _chain(board, 0, options)
+    shifts, remains = registration(chain, _scans(board, chain, occluders, photos, options))
+    moved = [old + new for old, new in zip(board.shifts, shifts, strict=True)]
+    keep = [k for k, (s, r) in enumerate(zip(moved, remains, strict=True))
+            if not r > DISAGREES and np.linalg.norm(s) < LARGEST_SHIFT]
+    if len(keep) < 2:
+        return board
+    names = tuple(v.view.name for k, v in enumerate(board.views) if k not in keep)
+    return replace(
+        board, views=[board.views[k] for k in keep], shifts=[moved[k] for k in keep], left_out=board.left_out + names
+    )
+
+
+def _finish(
+    board: _Board, capture: Capture, occluders: Occluders, photos: Photos, options: SegmentOptions
+) -> BoardOutlines:
+    """Exact boundaries of every piece, or the cloud's outline."""
+    if not board.views:
+        return _from_cloud(board, options)
+    outlines = [_outline(board, k, capture, occluders, photos, options) for k in range(len(board.regions))]
+    largest = max((float(np.linalg.norm(s)) for s in board.shifts), default=0.0)
+    names = tuple(v.view.name for v in board.views)
+    return BoardOutlines(tuple(outlines), names, board.left_out, None, board.grid.pixel, largest)
+
+
+def _outline(
+    board: _Board, k: int, capture: Capture, occluders: Occluders, photos: Photos, options: SegmentOptions
+) -> Outline:
+    chain = _chain(board, k, options)
+    scans = _scans(board, chain, occluders, photos, options)
+    cut_points = board.sheet.to_board(capture.cloud.points[board.sheet.cut_idx])[:, :2]
+    offset, error = settle(chain, scans, cut_points, board.grid.pixel, options)
+    points, error = snap(chain.moved(offset), error, chain.normals, board.limits, 2 * board.grid.pixel)
+    return Outline(loops_of(chain, points, error), "images", len(board.views))
+
+
+def _from_cloud(board: _Board, options: SegmentOptions) -> BoardOutlines:
+    """The rough region, cut back to its constraints."""
+    why = "no photograph shows the board well" if options.use_images else "photographs were not to be used"
+    chain = chain_of(board.sheet.region, options.step)
+    error = np.full(len(chain.points), options.outline_error / 2)
+    points, error = snap(chain.points, error, chain.normals, board.limits, options.outline_error)
+    outline = Outline(loops_of(chain, points, error), "cloud", 0)
+    return BoardOutlines((outline,), fallback=why, pixel=board.grid.pixel)

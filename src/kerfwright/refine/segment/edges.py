@@ -1,0 +1,153 @@
+"""Where the boundary lies in the photographs, to a fraction of a pixel.
+
+Each photograph shows each stretch of a square cut as a silhouette: a stretch that faces away from the camera on the near sheet plane,
+one that faces it on the far sheet plane (beyond the near plane comes the cut face, wood beside wood). Colour profiles are read along
+the boundary's normal on that plane, straight from the photographs. Mixing both kinds cancels what an error of the plane would do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfwright.identify.types import Sheet
+from kerfwright.refine.segment.grid import Grid
+from kerfwright.refine.segment.rectify import Photos, pixels_at, sample
+from kerfwright.refine.segment.scene import BOARD, CLEAR, OCCLUDED, Occluders
+from kerfwright.refine.segment.views import BoardView
+
+__all__ = ["EdgeScan", "scan_edges", "trace", "view_offsets"]
+
+PITCH = 0.25  # mm between profile samples
+WINDOW = 1.5  # mm on each side whose mean colours are compared
+ALONG = 2  # neighbours on each side averaged along the boundary
+BEYOND = 2.0  # mm outside the boundary where the background is looked up
+AGAINST = {CLEAR: 1.0, BOARD: 0.35, OCCLUDED: 0.0}  # weight of an edge against floor or wall, or another board
+CLEAR_STEP = 5.0  # steps stronger than this, in units of the wood's own, mark an edge
+NEAR_PEAK = 1.0  # mm within which a view's own peak may differ from the traced boundary
+BEND = 0.15  # cost of a change of offset by one pitch from point to point
+FAR = 0.4  # cost of an offset at the end of the search
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeScan:
+    """One view's profiles: strength (N, K) of the colour step at each offset, in units of the wood's own steps."""
+
+    strength: np.ndarray
+    weight: np.ndarray  # (N,), 0 where the view shows no edge
+    offsets: np.ndarray  # (K,), mm, positive outward
+
+
+def scan_edges(
+    points: np.ndarray, normals: np.ndarray, starts: np.ndarray, sheet: Sheet, board_idx: int, board_view: BoardView,
+    photos: Photos, occluders: Occluders, mask: np.ndarray, grid: Grid, shift: np.ndarray, reach: float,
+) -> EdgeScan:
+    """Profiles of one view along (N, 2) boundary points with outward normals; `starts` (N,) numbers their loops."""
+    facing = ((board_view.eye[:2] - points) * normals).sum(1) > 0
+    z = np.where(facing, board_view.far, board_view.near)
+    offsets = np.arange(-reach - WINDOW, reach + WINDOW + PITCH / 2, PITCH)
+    xy = points[:, None] + offsets[None, :, None] * normals[:, None]
+    pixels = pixels_at(sheet, board_view.view, xy.reshape(-1, 2), np.repeat(z, len(offsets)), shift)
+    colours, held = sample(photos, board_view.view, pixels.reshape(len(points), len(offsets), 2))
+    step = _steps(_lab(colours), starts)
+    half = round(WINDOW / PITCH)
+    strength = step / _usual(step, facing)
+    weight = _weights(points, normals, z, facing, sheet, board_idx, board_view, occluders, mask, grid)
+    return EdgeScan(strength, weight * held.all(1), offsets[half:-half])
+
+
+def _lab(colours: np.ndarray) -> np.ndarray:
+    import cv2
+
+    return cv2.cvtColor(colours.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
+
+
+def _steps(lab: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """(N, K, 3) profiles to (N, K - 2 half) lengths of the colour step, averaged along each loop first."""
+    for loop in np.unique(starts):
+        rows = np.flatnonzero(starts == loop)
+        lab[rows] = sum(lab[np.roll(rows, s)] for s in range(-ALONG, ALONG + 1)) / (2 * ALONG + 1)
+    half = round(WINDOW / PITCH)
+    total = np.cumsum(np.pad(lab, ((0, 0), (1, 0), (0, 0))), axis=1)
+    mean = (total[:, half:] - total[:, :-half]) / half  # mean[:, i] covers samples i .. i + half - 1
+    return np.linalg.norm(mean[:, half + 1:] - mean[:, :-half - 1], axis=2)[:, : lab.shape[1] - 2 * half]
+
+
+def _usual(step: np.ndarray, facing: np.ndarray) -> float:
+    """The size of steps on the wood itself: inside the boundary, on stretches that show the sheet face."""
+    rows = step[~facing] if (~facing).sum() > 10 else step
+    return max(1.0, float(np.sqrt(np.mean(np.minimum(rows[:, : step.shape[1] // 4], 20) ** 2))))
+
+
+def _weights(points, normals, z, facing, sheet, board_idx, board_view, occluders, mask, grid) -> np.ndarray:
+    """What a view's edge is worth at each point: visible, as silhouette, and against what."""
+    outer = np.column_stack([points + BEYOND * normals, z])
+    inner = np.column_stack([points - BEYOND * normals, z])
+    kinds = [occluders.classify(board_idx, board_view.view, sheet.to_world(p)) for p in (outer, inner)]
+    worth = np.vectorize(AGAINST.get, otypes=[float])(kinds[0]) * (kinds[1] != OCCLUDED)
+    pixels, _ = board_view.view.project(sheet.to_world(outer))
+    camera = board_view.view.camera
+    with np.errstate(invalid="ignore"):
+        worth *= (pixels > 2).all(1) & (pixels[:, 0] < camera.width - 2) & (pixels[:, 1] < camera.height - 2)
+    return worth * ~(facing & _behind_itself(outer, board_view, mask, grid))
+
+
+def _behind_itself(x_in_board: np.ndarray, board_view: BoardView, mask: np.ndarray, grid: Grid) -> np.ndarray:
+    """Whether the board's own near face hides points of its far plane."""
+    eye = board_view.eye
+    share = (board_view.near - eye[2]) / (x_in_board[:, 2] - eye[2])
+    return grid.lookup(mask, (eye + share[:, None] * (x_in_board - eye))[:, :2], False)
+
+
+def trace(scans: Sequence[EdgeScan], starts: np.ndarray) -> np.ndarray:
+    """(N,) offset of the boundary that all views together like best, smooth along each loop."""
+    score = sum(np.log1p((s.strength / CLEAR_STEP) ** 2) * s.weight[:, None] for s in scans)
+    total = np.maximum(sum(s.weight for s in scans), 1.0)
+    offsets = scans[0].offsets
+    cost = -score / total[:, None] + FAR * (offsets / offsets[-1]) ** 2
+    path = np.zeros(len(cost))
+    for loop in np.unique(starts):
+        rows = np.flatnonzero(starts == loop)
+        path[rows] = offsets[_cheapest_loop(cost[rows])]
+    return path
+
+
+def _cheapest_loop(cost: np.ndarray) -> np.ndarray:
+    """Viterbi round a closed chain: run half a turn longer at both ends, keep the middle."""
+    n = len(cost)
+    turn = np.arange(-(n // 2), n + n // 2) % n
+    best, back = cost[turn[0]].copy(), np.zeros((len(turn), cost.shape[1]), int)
+    k = np.arange(cost.shape[1])
+    for i, row in enumerate(turn[1:], 1):
+        moves = np.stack([_moved(best, d) + BEND * abs(d) for d in (0, -1, 1, -2, 2)])
+        pick = moves.argmin(0)
+        back[i] = np.clip(k + np.array([0, -1, 1, -2, 2])[pick], 0, len(k) - 1)
+        best = moves[pick, k] + cost[row]
+    chain = np.empty(len(turn), int)
+    chain[-1] = best.argmin()
+    for i in range(len(turn) - 1, 0, -1):
+        chain[i - 1] = back[i, chain[i]]
+    return chain[n // 2 : n // 2 + n]
+
+
+def _moved(values: np.ndarray, by: int) -> np.ndarray:
+    """values[k + by], infinite beyond the ends."""
+    out = np.full(len(values), np.inf)
+    out[max(0, -by) : len(values) - max(0, by)] = values[max(0, by) : len(values) + min(0, by)]
+    return out
+
+
+def view_offsets(scan: EdgeScan, path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(N,) offset of a view's own peak near the traced boundary, to a fraction of the pitch, and its weight (0: no peak)."""
+    offsets, strength = scan.offsets, scan.strength
+    near = abs(offsets[None] - path[:, None]) <= NEAR_PEAK
+    k = np.where(near, strength, -1).argmax(1).clip(1, len(offsets) - 2)
+    rows = np.arange(len(path))
+    left, here, right = strength[rows, k - 1], strength[rows, k], strength[rows, k + 1]
+    bend = left - 2 * here + right
+    peak = (here >= left) & (here >= right) & (bend < 0) & (here > CLEAR_STEP / 2)
+    vertex = np.where(peak, 0.5 * (left - right) / np.where(peak, bend, -1), 0)
+    strong = np.minimum(here / CLEAR_STEP, 2.0)
+    return offsets[k] + vertex.clip(-1, 1) * PITCH, np.where(peak, scan.weight * strong, 0)

@@ -1,0 +1,156 @@
+"""What each photograph says about each pixel of a board's plane: inside or outside, in nats."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfwright.identify.types import Sheet
+from kerfwright.refine.segment.appearance import Mixture, fit_mixture
+from kerfwright.refine.segment.grid import Grid
+from kerfwright.refine.segment.options import SegmentOptions
+from kerfwright.refine.segment.scene import BOARD, CLEAR, OCCLUDED, Occluders
+from kerfwright.refine.segment.views import BoardView
+
+__all__ = ["Seeds", "ViewEvidence", "classes_on_grid", "cut_face_band", "gather", "grown", "seeds_of", "signed_distance"]
+
+STRIDE = 3  # rays are cast for every third pixel: outlines of occluders are no better than that
+OCCLUDER_ERROR = 0.5  # share of the outline error by which occluders are grown
+PRIOR = 0.5  # nats for each outline error that a pixel lies inside the outline so far
+PRIOR_REACH = 3.0  # outline errors
+LEAST_TRUST = 0.15
+
+
+@dataclass(frozen=True, eq=False)
+class Seeds:
+    """What is settled before the photographs are asked, and the distance to the outline so far."""
+
+    inside: np.ndarray  # bool (rows, cols)
+    outside: np.ndarray
+    distance: np.ndarray  # mm, positive inside the outline so far
+
+
+@dataclass(frozen=True, eq=False)
+class ViewEvidence:
+    """One photograph's say: nats for inside, and the weight of each pixel's say (0: not seen)."""
+
+    nats: np.ndarray
+    weight: np.ndarray
+    seen: np.ndarray  # bool: not occluded
+
+
+def signed_distance(mask: np.ndarray, pixel: float) -> np.ndarray:
+    """Distance to the mask's boundary in mm, positive inside."""
+    import cv2
+
+    inner, outer = (cv2.distanceTransform(m.astype(np.uint8), cv2.DIST_L2, 5) for m in (mask, ~mask))
+    return np.where(mask, inner - 0.5, 0.5 - outer) * pixel
+
+
+def grown(mask: np.ndarray, by: float, pixel: float) -> np.ndarray:
+    """The mask dilated by `by` mm (eroded when negative)."""
+    return signed_distance(mask, pixel) > -by if mask.any() else mask
+
+
+def seeds_of(mask: np.ndarray, forbidden: np.ndarray, error: float, margin: float, pixel: float) -> Seeds:
+    """Hard seeds: the eroded outline is inside, what is far out is outside, as is what constraints or other boards take."""
+    distance = signed_distance(mask, pixel)
+    depth = min(error, 0.5 * float(distance.max()))
+    outside = (distance < -margin) & ~_hull(mask)
+    outside[[0, -1]], outside[:, [0, -1]] = True, True
+    return Seeds((distance > depth) & ~forbidden, outside | forbidden, distance)
+
+
+def _hull(mask: np.ndarray) -> np.ndarray:
+    import cv2
+
+    points = np.argwhere(mask)[:, ::-1].astype(np.int32)
+    canvas = np.zeros(mask.shape, np.uint8)
+    cv2.fillConvexPoly(canvas, cv2.convexHull(points), 1)
+    return canvas.astype(bool)
+
+
+def classes_on_grid(
+    sheet: Sheet, board_idx: int, board_view: BoardView, grid: Grid, occluders: Occluders, error: float
+) -> np.ndarray:
+    """CLEAR, BOARD or OCCLUDED for every pixel; occluders and boards behind are grown by what is not known of them."""
+    import cv2
+
+    coarse = grid.centres()[::STRIDE, ::STRIDE]
+    points = np.concatenate([coarse, np.full((*coarse.shape[:2], 1), board_view.near)], axis=2).reshape(-1, 3)
+    kinds = occluders.classify(board_idx, board_view.view, sheet.to_world(points)).reshape(coarse.shape[:2])
+    radius = max(1, round(OCCLUDER_ERROR * error / (STRIDE * grid.pixel)))
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2)
+    grown_kinds = cv2.dilate(kinds, disc)  # OCCLUDED > BOARD > CLEAR: the larger wins
+    return cv2.resize(grown_kinds, grid.shape[::-1], interpolation=cv2.INTER_NEAREST)
+
+
+def cut_face_band(mask: np.ndarray, board_view: BoardView, grid: Grid) -> np.ndarray:
+    """Where the board's own cut faces show, or its far side would: the slab's shadow on its near plane, less the face itself."""
+    import cv2
+
+    height, thickness = abs(board_view.eye[2] - board_view.near), abs(board_view.near - board_view.far)
+    eye = grid.to_index(board_view.eye[:2])
+    least = height / (height + thickness)
+    rows, columns = mask.shape
+    reach = max(np.linalg.norm(eye - c) for c in ((0, 0), (columns, 0), (0, rows), (columns, rows))) * (1 - least)
+    band = np.zeros(mask.shape, np.uint8)
+    for scale in np.linspace(1, least, 2 + int(min(reach, 60) / 2)):
+        turn = np.array([[scale, 0, eye[0] * (1 - scale)], [0, scale, eye[1] * (1 - scale)]])
+        band |= cv2.warpAffine(mask.astype(np.uint8), turn, (columns, rows), flags=cv2.INTER_NEAREST)
+    return band.astype(bool) & ~mask
+
+
+def gather(
+    lab: np.ndarray, held: np.ndarray, kinds: np.ndarray, band: np.ndarray, seeds: Seeds, error: float,
+    options: SegmentOptions, rng: np.random.Generator,
+) -> ViewEvidence | None:
+    """One view's evidence; None when it shows too little of the inside to learn its colours."""
+    seen = held & (kinds != OCCLUDED)
+    beyond = seen & (seeds.distance < -error) & ~band
+    inside = _learn(lab[seen & seeds.inside], options, rng)
+    outside = {kind: _learn(lab[beyond & (kinds == kind)], options, rng) for kind in (CLEAR, BOARD)}
+    if inside is None:
+        return None
+    ask = seen & ~seeds.outside & ~seeds.inside
+    nats, weight = np.zeros(seen.shape, np.float32), np.zeros(seen.shape, np.float32)
+    for kind, other in ((CLEAR, BOARD), (BOARD, CLEAR)):
+        model = outside[kind] or outside[other]
+        pixels = ask & (kinds == kind)
+        nats[pixels] = _log_ratio(inside, model, lab[pixels], options.evidence_cap)
+        weight[pixels] = 1.0 if kind == CLEAR else options.wood_share
+    # where the board's own cut face would show, wood says nothing; anything else still says outside
+    weight[band & (nats > 0)] = 0
+    trust = _trust(inside, outside[CLEAR] or outside[BOARD], lab, seen & seeds.inside, beyond, options.evidence_cap)
+    return ViewEvidence(nats, weight * trust, seen)
+
+
+def _learn(colours: np.ndarray, options: SegmentOptions, rng: np.random.Generator) -> Mixture | None:
+    return fit_mixture(colours, options.components, options.samples, rng)
+
+
+def _log_ratio(inside: Mixture, outside: Mixture | None, colours: np.ndarray, cap: float) -> np.ndarray:
+    if outside is None:
+        return np.zeros(len(colours), np.float32)
+    return np.clip(inside.log_density(colours) - outside.log_density(colours), -cap, cap)
+
+
+def _trust(
+    inside: Mixture, outside: Mixture | None, lab: np.ndarray, core: np.ndarray, beyond: np.ndarray, cap: float
+) -> float:
+    """How well a view tells its own training pixels apart, 0 to 1: a shadowed or glossy view must not outvote the rest."""
+    if outside is None:
+        return LEAST_TRUST
+    means = [_log_ratio(inside, outside, lab[m][:: max(1, int(m.sum()) // 2000)], cap).mean() if m.any() else 0.0
+             for m in (core, beyond)]
+    return float(np.clip((means[0] - means[1]) / cap, LEAST_TRUST, 1.0))
+
+
+def average(evidences: Sequence[ViewEvidence], seeds: Seeds, error: float) -> np.ndarray:
+    """Nats for inside over all views, and what the outline so far says."""
+    total = sum(e.nats * e.weight for e in evidences)
+    weight = sum(e.weight for e in evidences)
+    said = np.where(weight > 0, total / np.maximum(weight, 1e-6), 0)
+    return said + PRIOR * np.clip(seeds.distance / error, -PRIOR_REACH, PRIOR_REACH)

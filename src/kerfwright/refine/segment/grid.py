@@ -1,0 +1,67 @@
+"""The raster of a board's plane: pixel (row, col) lies at origin + (col + 1/2, row + 1/2) * pixel, so that rows grow with y."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from shapely.geometry import MultiPolygon, Polygon
+
+__all__ = ["Grid", "grid_over"]
+
+SUBPIXEL_BITS = 6  # cv2.fillPoly takes fixed-point corners
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A raster in the board frame, millimetres."""
+
+    origin: np.ndarray  # (2,) outer corner of pixel (0, 0)
+    pixel: float
+    shape: tuple[int, int]  # rows, columns
+
+    def centres(self) -> np.ndarray:
+        """(rows, columns, 2) pixel centres, mm."""
+        rows, columns = self.shape
+        x = self.origin[0] + (np.arange(columns) + 0.5) * self.pixel
+        y = self.origin[1] + (np.arange(rows) + 0.5) * self.pixel
+        return np.stack(np.meshgrid(x, y), axis=-1)
+
+    def to_index(self, xy: np.ndarray) -> np.ndarray:
+        """(..., 2) mm to (column, row), whole numbers at pixel centres."""
+        return (xy - self.origin) / self.pixel - 0.5
+
+    def to_xy(self, column_row: np.ndarray) -> np.ndarray:
+        """(..., 2) column and row to mm."""
+        return self.origin + (column_row + 0.5) * self.pixel
+
+    def mask(self, region: Polygon | MultiPolygon) -> np.ndarray:
+        """True where the pixel centre is inside the region (to 1/64 pixel)."""
+        import cv2
+
+        canvas = np.zeros(self.shape, np.uint8)
+        for polygon in getattr(region, "geoms", [region]):
+            rings = [self._fixed(ring) for ring in (polygon.exterior, *polygon.interiors) if not ring.is_empty]
+            if rings:
+                cv2.fillPoly(canvas, rings, 1, lineType=cv2.LINE_8, shift=SUBPIXEL_BITS)
+        return canvas.astype(bool)
+
+    def _fixed(self, ring) -> np.ndarray:
+        index = self.to_index(np.asarray(ring.coords)[:, :2])
+        return np.round(index * (1 << SUBPIXEL_BITS)).astype(np.int32).reshape(-1, 1, 2)
+
+    def lookup(self, values: np.ndarray, xy: np.ndarray, outside) -> np.ndarray:
+        """The raster's value at (N, 2) points, by nearest pixel; `outside` beyond its edge."""
+        index = np.floor((xy - self.origin) / self.pixel).astype(int)
+        ok = (index >= 0).all(1) & (index[:, 0] < self.shape[1]) & (index[:, 1] < self.shape[0])
+        found = np.full(len(xy), outside, dtype=values.dtype)
+        found[ok] = values[index[ok, 1], index[ok, 0]]
+        return found
+
+
+def grid_over(region: Polygon, margin: float, pixel: float, max_pixels: int) -> Grid:
+    """A raster over the region's bounding box and a margin, of at most `max_pixels` pixels."""
+    low, high = np.array(region.bounds).reshape(2, 2) + [[-margin], [margin]]
+    pixel = max(pixel, float(np.sqrt(np.prod(high - low) / max_pixels)))
+    columns, rows = np.ceil((high - low) / pixel).astype(int)
+    return Grid(low, pixel, (int(rows), int(columns)))
