@@ -8,9 +8,14 @@ import typer
 
 from kerfwright import __version__
 from kerfwright.commands.check import check
+from kerfwright.commands.config import config
 from kerfwright.commands.demo import demo
+from kerfwright.commands.doctor import doctor
 from kerfwright.commands.export import export
+from kerfwright.commands.info import info
 from kerfwright.commands.reconstruct import reconstruct
+from kerfwright.commands.view import view
+from kerfwright.config import CONFIGURABLE, config_path, read_config
 
 __all__ = ["app"]
 
@@ -38,7 +43,9 @@ def _common(
 ) -> None:
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
+    elif context.invoked_subcommand in CONFIGURABLE:
+        context.default_map = read_config(config_path())
 
 
-for command in (reconstruct, demo, check, export):
+for command in (reconstruct, demo, info, view, check, export, doctor, config):
     app.command()(command)

@@ -19,7 +19,7 @@ from kerfwright.supervise import supervised
 if TYPE_CHECKING:
     from kerfwright.model import Finding
 
-__all__ = ["reconstruct", "run_reconstruct", "say_errors"]
+__all__ = ["ScaleMm", "Up", "checked_axis", "checked_scale", "reconstruct", "run_reconstruct", "say_errors"]
 
 _UP = ("x", "y", "z", "-x", "-y", "-z")
 # Read by the numeric libraries when they are first imported.
@@ -52,7 +52,7 @@ def reconstruct(
     verbose: Verbose = False,
 ) -> None:
     """Reconstruct the boards of CAPTURE: a STEP assembly, a DXF file a board, the model and a report."""
-    options = ReconstructOptions(up=_axis(up), millimetres_per_unit=_positive(scale), seed=seed)
+    options = ReconstructOptions(up=checked_axis(up), millimetres_per_unit=checked_scale(scale), seed=seed)
     _limit_threads(jobs)
     reporter = reporter_for(sys.stdout if as_json else sys.stderr, quiet=quiet, as_json=as_json, verbose=verbose)
     farewell = f"Results in {out}: open report.html in a browser, model.step in FreeCAD or another CAD program."
@@ -115,13 +115,15 @@ def _ending(code: int) -> str:
     return f"error: a library ended it with {signal.Signals(number).name}: this is a bug; report it with your command"
 
 
-def _axis(up: str) -> str:
+def checked_axis(up: str) -> str:
+    """The axis, if it is one."""
     if up not in _UP:
         raise OptionError(f"--up: {up}: not an axis: use one of {', '.join(_UP)}")
     return up
 
 
-def _positive(scale: float | None) -> float | None:
+def checked_scale(scale: float | None) -> float | None:
+    """The scale, if it is a length."""
     if scale is not None and not 0 < scale < float("inf"):
         raise OptionError(f"--scale: {scale}: not a length: give the millimetres of one capture unit")
     return scale

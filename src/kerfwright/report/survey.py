@@ -1,0 +1,136 @@
+"""What a capture holds, and whether it is enough: to know before the time is spent."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfwright.capture.types import Capture, View
+from kerfwright.model import Finding
+
+__all__ = ["Survey", "survey"]
+
+FEW_PHOTOGRAPHS = 12  # one ring at 30 degrees: less leaves sides that two photographs don't share
+WIDE_GAP = 75.0  # degrees round the object; stereo does not match across more, and faces between are seen aslant
+FEW_PIXELS = 400  # across the object: outlines come out to about half a pixel, a millimetre on an object of 80 cm
+FEW_POINTS = 20_000
+# Texture of a surface whose local contrast is below this many times the photographs' noise is lost in it.
+NOISE_FACTOR = 1.5
+PLAIN_SHARE = 0.75  # of bare wood with a faint grain, up to half is as plain as that; of paint, nearly all
+_PATCH = 7  # pixels a side, in which contrast is measured
+_SAMPLE = 4000
+
+
+@dataclass(frozen=True)
+class Survey:
+    """Figures of a capture in millimetres, degrees and pixels, and what is to be said of them."""
+
+    images: int
+    image_sizes: tuple[str, ...]
+    camera_models: tuple[str, ...]
+    points: int
+    colours: bool
+    extent_mm: tuple[float, float, float]
+    millimetres_per_unit: float
+    scale_origin: str
+    widest_gap_deg: float
+    pixel_mm: float
+    plain_share: float
+    findings: tuple[Finding, ...]
+
+
+def survey(capture: Capture) -> Survey:
+    """Survey a prepared capture (world in millimetres, z up).
+
+    Raises
+    ------
+    CaptureError when a photograph cannot be read.
+    """
+    points = capture.cloud.points[:: max(1, len(capture.cloud) // _SAMPLE)]
+    sizes = Counter(f"{v.camera.width}x{v.camera.height}" for v in capture.views)
+    figures = {
+        "images": len(capture.views), "image_sizes": tuple(sorted(sizes)),
+        "camera_models": tuple(sorted({v.camera.model for v in capture.views})),
+        "points": len(capture.cloud), "colours": capture.cloud.colours is not None,
+        "extent_mm": tuple(round(float(x), 1) for x in np.ptp(capture.cloud.points, axis=0)),
+        "millimetres_per_unit": capture.scale.millimetres_per_unit, "scale_origin": capture.scale.origin,
+        "widest_gap_deg": round(_widest_gap(capture.views, points), 1),
+        "pixel_mm": round(_pixel_size(capture.views, points), 3),
+        "plain_share": round(_plain_share(capture, points), 3),
+    }
+    return Survey(**figures, findings=tuple(_findings(figures, capture)))
+
+
+def _findings(figures: dict, capture: Capture) -> Iterator[Finding]:
+    if figures["images"] < FEW_PHOTOGRAPHS:
+        yield _warn("K010", f"{figures['images']} photographs are few", "take 20 to 40, all round and from above")
+    if figures["widest_gap_deg"] > WIDE_GAP:
+        yield _warn(
+            "K011", f"{figures['widest_gap_deg']:.0f} degrees round the object without a photograph",
+            "photograph that side, or expect its boards to be inferred", figures["widest_gap_deg"],
+        )
+    across = max(figures["extent_mm"]) / figures["pixel_mm"] if figures["pixel_mm"] else 0.0
+    if across < FEW_PIXELS:
+        message = f"the object is only {across:.0f} pixels large"
+        yield _warn("K012", message, "go nearer, or keep full resolution", across)
+    if figures["points"] < FEW_POINTS:
+        yield _warn("K013", f"{figures['points']} points are few", "make the dense cloud, not the sparse one")
+    if figures["plain_share"] > PLAIN_SHARE:
+        yield _warn(
+            "K014", f"{100 * figures['plain_share']:.0f} % of the surface shows no texture above the noise",
+            "painted or glossy boards come out rough: stick on tape, or photograph in better light",
+            figures["plain_share"],
+        )
+    if capture.scale.origin == "assumed":
+        yield _warn("K003", "the scale is assumed: 1 capture unit = 1 m", "measure a board and give --scale")
+    for note in capture.notes:
+        yield Finding(code="K001", severity="info", message=note)
+
+
+def _warn(code: str, message: str, remedy: str, value: float | None = None) -> Finding:
+    return Finding(code=code, severity="warning", message=message, remedy=remedy, value=value)
+
+
+def _widest_gap(views: Sequence[View], points: np.ndarray) -> float:
+    """Widest angle round the vertical, degrees, between neighbouring cameras that do not look straight down."""
+    away = np.array([view.centre for view in views]).reshape(-1, 3) - np.median(points, axis=0)
+    slanted = np.hypot(away[:, 0], away[:, 1]) > 0.35 * np.linalg.norm(away, axis=1)
+    azimuths = np.sort(np.degrees(np.arctan2(away[slanted, 1], away[slanted, 0])))
+    if not len(azimuths):
+        return 360.0
+    return float(np.diff([*azimuths, azimuths[0] + 360]).max())
+
+
+def _pixel_size(views: Sequence[View], points: np.ndarray) -> float:
+    """Median over the views of what a pixel covers on the object, mm."""
+    sizes = [float(np.median(view.project(points)[1])) / view.camera.focal for view in views]
+    return float(np.median(sizes)) if sizes else 0.0
+
+
+def _plain_share(capture: Capture, points: np.ndarray, most: int = 6) -> float:
+    """Share of the surface, as photographs see it, whose contrast does not rise above their noise."""
+    chosen = capture.views[:: max(1, len(capture.views) // most)]
+    contrasts = [_contrast_over_noise(view, points) for view in chosen]
+    seen = np.concatenate(contrasts) if contrasts else np.zeros(0)
+    return float(np.mean(seen < NOISE_FACTOR)) if len(seen) else 0.0
+
+
+def _contrast_over_noise(view: View, points: np.ndarray) -> np.ndarray:
+    """Local standard deviation of the grey values where points project, over the photograph's own noise.
+
+    Noise is measured where the photograph is flattest: the tenth percentile of the same deviation over the whole
+    picture, so that JPEG's smoothing, which acts on both, cancels.
+    """
+    import cv2
+
+    grey = cv2.cvtColor(view.image(), cv2.COLOR_RGB2GRAY).astype(np.float32)
+    mean, square = (cv2.blur(g, (_PATCH, _PATCH)) for g in (grey, grey * grey))
+    deviation = np.sqrt(np.maximum(square - mean * mean, 0))
+    noise = max(0.5, float(np.percentile(deviation, 10)))
+    pixels, depth = view.project(points)
+    inside = (depth > 0) & ((pixels >= 0) & (pixels < [view.camera.width, view.camera.height])).all(axis=1)
+    columns, rows = pixels[inside].astype(int).T
+    return deviation[rows, columns] / noise

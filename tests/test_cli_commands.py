@@ -1,0 +1,132 @@
+"""The smaller commands, run in this process: OCCT takes seconds to import."""
+
+import json
+import sys
+from importlib import import_module
+from types import SimpleNamespace
+
+import pytest
+
+from kerfwright import cli
+from kerfwright.demo import demo_capture
+from kerfwright.model import Board, CutPath, Line, Loop, Model, Quantity
+from kerfwright.model.io import write_model
+
+
+@pytest.fixture
+def kerfwright(monkeypatch, capsys):
+    """Run the command line; exit code, standard output and standard error."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", "/nonexistent")
+
+    def run(*arguments) -> SimpleNamespace:
+        monkeypatch.setattr(sys, "argv", ["kerfwright", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        said = capsys.readouterr()
+        return SimpleNamespace(returncode=ended.value.code, stdout=said.out, stderr=said.err)
+
+    return run
+
+
+def board(name: str, x: float, y: float = 0) -> Board:
+    """A block of 100 x 50 on the floor, 20 thick."""
+    corners = [(0, 0), (100, 0), (100, 50), (0, 50)]
+    edges = tuple(Line(start=a, end=b) for a, b in zip(corners, corners[1:] + corners[:1], strict=True))
+    pose = ((1, 0, 0, x), (0, 1, 0, y), (0, 0, 1, 0), (0, 0, 0, 1))
+    path = CutPath(outer=Loop(edges=edges))
+    return Board(name=name, model_from_board=pose, thickness=Quantity(value=20), cut_path=path)
+
+
+@pytest.fixture
+def sound(tmp_path):
+    write_model(Model(name="block", boards=(board("a", 0),)), tmp_path / "model.json")
+    return tmp_path / "model.json"
+
+
+@pytest.fixture
+def overlapping(tmp_path):
+    write_model(Model(name="blocks", boards=(board("a", 0), board("b", 60))), tmp_path / "model.json")
+    return tmp_path / "model.json"
+
+
+def test_check_passes_what_can_be_built(kerfwright, sound):
+    done = kerfwright("check", sound)
+    assert done.returncode == 0 and done.stdout.splitlines()[-1].startswith("0 errors"), done.stderr
+
+
+def test_check_names_what_cannot(kerfwright, overlapping):
+    done = kerfwright("check", overlapping)
+    assert done.returncode == 1 and "K110 error: a and b" in done.stdout
+    found = [json.loads(line) for line in kerfwright("check", overlapping, "--json").stdout.splitlines()]
+    assert {"K110"} <= {f["code"] for f in found} and found[0]["boards"] == ["a", "b"]
+
+
+def test_export_writes_and_lists_its_files(kerfwright, sound, tmp_path):
+    done = kerfwright("export", sound, "step", "dxf", "-o", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == [str(tmp_path / "out" / n) for n in ("model.step", "parts/a.dxf")]
+    again = kerfwright("export", sound, "step214", "-o", tmp_path / "out")
+    assert again.returncode == 0 and (tmp_path / "out" / "parts" / "a.dxf").exists(), "other files stay"
+
+
+def test_export_is_forbidden_by_an_error_unless_forced(kerfwright, overlapping, tmp_path):
+    done = kerfwright("export", overlapping, "step", "-o", tmp_path / "out")
+    assert done.returncode == 1 and "K110" in done.stderr and not (tmp_path / "out").exists()
+    forced = kerfwright("export", overlapping, "step", "-o", tmp_path / "out", "--force")
+    assert forced.returncode == 0 and "NOT VERIFIED" in (tmp_path / "out" / "model.step").read_text()
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (("check", "{}/none.json"), ["none.json"]),
+    (("export", "{}/model.json", "stl5", "-o", "{}/out"), ["stl5", "step"]),
+    (("export", "{}/none.json", "step", "-o", "{}/out"), ["none.json"]),
+    (("export", "{}/model.json", "step", "-o", "{}/model.json"), ["is a file"]),
+    (("view", "{}"), ["report.html", "kerfwright reconstruct"]),
+    (("info", "{}/none"), ["none"]),
+    (("info", "{}", "--up", "w"), ["--up: w"]),
+])
+def test_bad_input_is_one_line_and_exit_code_2(kerfwright, sound, tmp_path, arguments, words):
+    done = kerfwright(*(a.format(tmp_path) for a in arguments))
+    assert done.returncode == 2 and done.stdout == ""
+    assert done.stderr.startswith("kerfwright: error: ") and done.stderr.count("\n") == 1, done.stderr
+    assert all(word in done.stderr for word in words), done.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["model.json"]
+
+
+def test_info_of_the_shipped_capture(kerfwright):
+    done = kerfwright("info", demo_capture())
+    assert done.returncode == 0 and "20, 1024x768, PINHOLE" in done.stdout and "120000 points" in done.stdout
+    assert done.stdout.splitlines()[-1] == "This is enough."
+    scaled = json.loads(kerfwright("info", demo_capture(), "--json", "--scale", 2000).stdout)
+    assert scaled["scale_origin"] == "given" and 800 < scaled["extent_mm"][2] < 820
+
+
+def test_doctor_finds_nothing_amiss_here(kerfwright):
+    done = kerfwright("doctor")
+    assert done.returncode == 0 and done.stdout.splitlines()[-1] == "All is well."
+
+
+def test_doctor_finds_what_is_broken(kerfwright, monkeypatch, tmp_path):
+    (tmp_path / "fragile.py").write_text("raise ImportError('libfoo.so.1: cannot open shared object file')")
+    monkeypatch.syspath_prepend(tmp_path)
+    modules = (("fragile", "fragile", "tests"), ("numpy", "numpy", "numbers"))
+    monkeypatch.setattr(import_module("kerfwright.commands.doctor"), "_MODULES", modules)
+    done = kerfwright("doctor")
+    (bad,) = [line for line in done.stdout.splitlines() if line.startswith("BAD")]
+    assert done.returncode == 1 and "fragile, for tests: libfoo.so.1" in bad and "pip install" in bad
+    assert done.stdout.splitlines()[-1].startswith("1 problem")
+
+
+def test_config_is_written_once_and_used(kerfwright, monkeypatch, tmp_path):
+    shown = kerfwright("config", "--show").stdout
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    path = tmp_path / "kerfwright" / "config.toml"
+    assert kerfwright("config").stdout.strip() == str(path) and shown == path.read_text()
+    path.write_text('[reconstruct]\nup = "w"\n')
+    again = kerfwright("config")
+    assert again.returncode == 2 and "is there already" in again.stderr
+    wrong = kerfwright("reconstruct", "c", "-o", tmp_path / "out")
+    assert wrong.returncode == 2 and "--up: w" in wrong.stderr
+    right = kerfwright("reconstruct", "c", "-o", tmp_path / "out", "--up", "y", "--scale", "-1")
+    assert "--scale" in right.stderr, "the command line goes before the file"
+    assert kerfwright("config", "--show").returncode == 0
