@@ -1,0 +1,69 @@
+"""What contacts, corners and the ground say about each board's cut path (paper, Interface surfaces & constraints)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kerfwright.assemble.contacts import Decided
+from kerfwright.assemble.joints import Joint, Trace, columns, runs_of, face_plane, trace_of
+from kerfwright.assemble.options import AssembleOptions
+from kerfwright.assemble.types import ConstraintSegment
+from kerfwright.identify.types import Sheet
+
+__all__ = ["constraint_segments"]
+
+PLANE_ERROR = 0.15  # mm; standard error of an aligned sheet plane, of a board seen from half a metre
+
+
+def constraint_segments(
+    sheets: tuple[Sheet, ...], decided: list[Decided], diameter: float, options: AssembleOptions
+) -> tuple[tuple[ConstraintSegment, ...], ...]:
+    """Per board its constraint segments: contacts first, then corners, then the ground."""
+    out: list[list[ConstraintSegment]] = [[] for _ in sheets]
+    for number, d in enumerate(decided):
+        out[d.joint.b] += _segments(d.joint.trace, d.joint.intervals, "contact", number)
+        if d.kind == 2:
+            trace = _outer_trace(sheets, d)
+            if trace is not None:
+                out[d.joint.a] += _segments(trace, d.other.intervals, "corner", number)
+    for k, sheet in enumerate(sheets):
+        contacts = [d.joint for d in decided if d.joint.b == k]
+        out[k] += _ground(sheet, contacts, diameter, options)
+    return tuple(tuple(segments) for segments in out)
+
+
+def _segments(trace: Trace, intervals: tuple[tuple[float, float], ...], origin: str, contact: int | None) -> list[ConstraintSegment]:
+    """Directed so that the wood lies on the left."""
+    slanted = abs(trace.slope) > 1e-3
+    return [
+        ConstraintSegment(
+            start=trace.place(np.zeros(1), np.array([high]))[0], end=trace.place(np.zeros(1), np.array([low]))[0],
+            origin=origin, standard_error=PLANE_ERROR, normal=trace.normal if slanted else None, depth=trace.depth, contact=contact,
+        )
+        for low, high in intervals
+    ]
+
+
+def _outer_trace(sheets: tuple[Sheet, ...], d: Decided) -> Trace | None:
+    """Trace in the board that runs through of the outer face of the board that stops on it: there the corner closes."""
+    b = sheets[d.joint.b]
+    inner = d.other.face_a  # of b, on which a would have ended
+    normal, offset = face_plane(b, "bottom" if inner == "top" else "top")
+    return trace_of(sheets[d.joint.a], -normal, -offset)
+
+
+def _ground(sheet: Sheet, contacts: list[Joint], diameter: float, options: AssembleOptions) -> list[ConstraintSegment]:
+    """Where the board stands on the floor z = 0, unless it ends on another board there."""
+    trace = trace_of(sheet, np.array([0.0, 0, 1]), 0.0)
+    if trace is None:
+        return []
+    step = diameter / 200
+    along, first, _ = columns(sheet.region, trace, step)
+    standing = np.abs(first) < options.ground_reach * diameter
+    for joint in contacts:
+        if joint.trace.m @ trace.m > 0.9:
+            for low, high in joint.intervals:
+                ends = (joint.trace.place(np.zeros(2), np.array([low, high])) @ trace.tangent)
+                standing &= ~((along > ends.min() - 4 * step) & (along < ends.max() + 4 * step))
+    runs = runs_of(along, standing, step, options.min_contact * diameter, joining=2 * step)
+    return _segments(trace, runs, "ground", None)

@@ -1,0 +1,191 @@
+"""All contacts of an assembly: who ends on whom (paper, Connections and Disambiguating Corners; types 1 and 2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfwright.assemble.joints import Joint, end_on, face_plane
+from kerfwright.assemble.options import AssembleOptions
+from kerfwright.assemble.seams import Seam, look_for_end, look_for_seam
+from kerfwright.assemble.visibility import Obstacles
+from kerfwright.identify.photo_edges import Photos
+from kerfwright.identify.types import Sheet
+from kerfwright.model import Contact, ContactEvidence
+
+__all__ = ["Decided", "find_contacts", "to_contact"]
+
+LEAST_SEAM = 1.35  # a visible seam is at least this much stronger than the face beside it
+CLEAR_MARGIN = 1.25  # ratio of seam scores from which a corner counts as decided by the photographs
+
+
+@dataclass(frozen=True, eq=False)
+class Decided:
+    """A contact as decided: b ends on a; for a corner also the joint that was not chosen."""
+
+    joint: Joint
+    kind: int  # contact type, 1 or 2
+    other: Joint | None
+    evidence: ContactEvidence
+
+
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    sheets: tuple[Sheet, ...]
+    diameter: float
+    photos: Photos
+    obstacles: Obstacles
+    options: AssembleOptions
+
+    def mm(self, fraction: float) -> float:
+        return fraction * self.diameter
+
+
+def find_contacts(sheets: tuple[Sheet, ...], diameter: float, photos: Photos, options: AssembleOptions) -> list[Decided]:
+    """Every pair of boards that meets cut on sheet, with corners decided."""
+    scene = _Scene(sheets, diameter, photos, Obstacles(sheets, options.outline_error * diameter), options)
+    near, far = _all_joints(scene)
+    found: list[Decided] = []
+    for a in range(len(sheets)):
+        for b in range(a + 1, len(sheets)):
+            pair = [near.get((a, b)), near.get((b, a))]
+            if all(pair):
+                found.append(_corner(scene, *pair))
+            elif any(pair):
+                found.append(Decided(pair[0] or pair[1], 1, None, ContactEvidence()))
+            else:
+                seen = [d for key in ((a, b), (b, a)) if (d := _confirmed(scene, far.get(key)))]
+                found.extend(sorted(seen, key=lambda d: -d.evidence.seam_score)[:1])
+    return _like_their_twins(scene, found)
+
+
+def _all_joints(scene: _Scene) -> tuple[dict[tuple[int, int], Joint], dict[tuple[int, int], Joint]]:
+    """Joints by (a, b): those within the outline's own error, and those further apart."""
+    near, far, o = {}, {}, scene.options
+    for a in range(len(scene.sheets)):
+        for b in range(len(scene.sheets)):
+            if a == b:
+                continue
+            joint = end_on(
+                scene.sheets, a, b, scene.mm(o.far_reach), scene.mm(o.outline_error), scene.mm(1 / 200), scene.mm(o.min_contact)
+            )
+            if joint is None:
+                continue
+            if joint.gap > scene.mm(o.reach):
+                far[a, b] = joint
+            else:
+                near[a, b] = joint
+    near = {key: j for key, j in near.items() if _is_contact(scene, j, near.get(key[::-1]))}
+    return near, far
+
+
+def _is_contact(scene: _Scene, joint: Joint, reverse: Joint | None) -> bool:
+    """A near joint counts when it is long enough and, where photographs show its line, they show an edge there.
+
+    A board whose outline covers the other's thickness stops there only if its outer face shows a seam, or the other may stop instead.
+    """
+    if joint.length < scene.mm(scene.options.reach):
+        return False
+    overlapping = joint.gap < -0.5 * scene.sheets[joint.a].thickness.value
+    if overlapping and reverse is not None:
+        return True
+    faces = [_outer_face(scene, joint)] if overlapping else ["top", "bottom"]
+    shown = [s for s in (_seam(scene, joint, face) for face in faces) if s.views >= 3]
+    return not shown or max(s.score for s in shown) > LEAST_SEAM
+
+
+def _seam(scene: _Scene, joint: Joint, face: str) -> Seam:
+    return look_for_seam(scene.sheets, joint, face, scene.photos, scene.obstacles, scene.mm(1 / 300))
+
+
+def _confirmed(scene: _Scene, joint: Joint | None) -> Decided | None:
+    """A far joint that the photographs confirm: the first strong edge beyond the outline is at the plane."""
+    if joint is None or joint.length < scene.mm(scene.options.reach):
+        return None
+    end = look_for_end(scene.sheets, joint, scene.photos, scene.obstacles, scene.mm(1 / 300))
+    if end is None or end.views < 3 or end.score < scene.options.end_score:
+        return None
+    if abs(end.offset) > scene.mm(scene.options.end_offset):
+        return None
+    return Decided(joint, 1, None, ContactEvidence(seam_score=end.score, views=end.views, decided_by="seam"))
+
+
+def _corner(scene: _Scene, first: Joint, second: Joint) -> Decided:
+    """Which of two boards stops: the one whose outer face shows the seam."""
+    seams = [_seam(scene, j, _outer_face(scene, j)) for j in (first, second)]
+    chosen = 0 if seams[0].score >= seams[1].score else 1
+    margin = seams[chosen].score / max(seams[1 - chosen].score, 1e-6)
+    evidence = ContactEvidence(
+        seam_score=seams[chosen].score, seam_score_other=seams[1 - chosen].score, views=seams[chosen].views,
+        decided_by="seam" if margin >= CLEAR_MARGIN else "default",
+    )
+    joints = (first, second)
+    return Decided(joints[chosen], 2, joints[1 - chosen], evidence)
+
+
+def _outer_face(scene: _Scene, joint: Joint) -> str:
+    """The face of b on the outer side of the corner: the one away from a's bulk."""
+    b = scene.sheets[joint.b]
+    middle = b.to_board(scene.sheets[joint.a].to_world(_middle(scene.sheets[joint.a])))[0, 2]
+    return "bottom" if middle > b.thickness.value / 2 else "top"
+
+
+def _middle(sheet: Sheet) -> np.ndarray:
+    centre = sheet.region.centroid
+    return np.array([[centre.x, centre.y, sheet.thickness.value / 2]])
+
+
+def _like_their_twins(scene: _Scene, found: list[Decided]) -> list[Decided]:
+    """Corners that the photographs leave open are decided as the corners between boards of the same sizes are."""
+    clear = [d for d in found if d.kind == 2 and d.evidence.decided_by == "seam"]
+    out = []
+    for d in found:
+        if d.kind == 2 and d.evidence.decided_by == "default":
+            votes = sum(_alike(scene, d.joint, c.joint) - _alike(scene, d.joint, c.other) for c in clear)
+            if votes < 0:
+                d = Decided(d.other, 2, d.joint, _swapped(d.evidence))
+        out.append(d)
+    return out
+
+
+def _swapped(e: ContactEvidence) -> ContactEvidence:
+    return e.model_copy(update={"seam_score": e.seam_score_other, "seam_score_other": e.seam_score})
+
+
+def _alike(scene: _Scene, one: Joint, other: Joint) -> int:
+    """1 when the boards of two joints have the same sizes in the same roles."""
+    return int(_same_size(scene.sheets[one.a], scene.sheets[other.a]) and _same_size(scene.sheets[one.b], scene.sheets[other.b]))
+
+
+def _same_size(a: Sheet, b: Sheet) -> bool:
+    area = a.region.area / b.region.area
+    return 0.75 < area < 1.33 and abs(a.thickness.value - b.thickness.value) < 0.15 * b.thickness.value
+
+
+def to_contact(decided: Decided, sheets: tuple[Sheet, ...]) -> Contact:
+    """The model's contact with its interface as rectangles on the plane: each as wide as board b's cut face."""
+    joint = decided.joint
+    a, b = sheets[joint.a], sheets[joint.b]
+    normal, offset = face_plane(a, joint.face_a)
+    polygons = tuple(_rectangle(joint, b, interval) for interval in joint.intervals)
+    width = b.thickness.value / joint.trace.sine
+    angle = float(np.degrees(np.arcsin(min(joint.trace.sine, 1.0))))
+    return Contact(
+        type=decided.kind, a=a.name, b=b.name, face_a=joint.face_a, face_b="edge",
+        point=_point(normal * offset), normal=_point(normal), interface=polygons, area=joint.length * width, angle=angle,
+        bevelled=abs(joint.trace.slope) > 1e-3, evidence=decided.evidence,
+    )
+
+
+def _rectangle(joint: Joint, b: Sheet, interval: tuple[float, float]) -> tuple:
+    corners = []
+    for along, z in ((interval[0], 0.0), (interval[1], 0.0), (interval[1], b.thickness.value), (interval[0], b.thickness.value)):
+        shift = joint.trace.slope * (z - joint.trace.depth)
+        xy = joint.trace.place(np.array([shift]), np.array([along]))[0]
+        corners.append(_point(b.to_world(np.array([[*xy, z]]))[0]))
+    return tuple(corners)
+
+
+def _point(v: np.ndarray) -> tuple[float, float, float]:
+    return tuple(float(c) for c in v)

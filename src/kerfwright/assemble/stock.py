@@ -1,0 +1,60 @@
+"""One thickness for all boards of one stock: clustered by uncertainty (paper, Thickness Regularization; method.md trap 13)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kerfwright.assemble.options import AssembleOptions
+from kerfwright.identify.types import Sheet
+from kerfwright.model import Origin, Quantity
+
+__all__ = ["share_thickness"]
+
+
+def share_thickness(sheets: tuple[Sheet, ...], diameter: float, options: AssembleOptions) -> tuple[Sheet, ...]:
+    """Sheets whose thicknesses agree within their uncertainty get their weighted mean; unseen ones take the commonest nearby.
+
+    The top sheet plane stays where it is: it was measured, the bottom follows.
+    """
+    value = np.array([s.thickness.value for s in sheets])
+    error = np.array([np.hypot(s.thickness.standard_error or 0, options.thickness_floor * diameter) for s in sheets])
+    seen = np.array([s.thickness_seen for s in sheets])
+    area = np.array([s.region.area for s in sheets])
+    groups = _clusters(np.flatnonzero(seen), value, error, options.thickness_sigmas)
+    out = list(sheets)
+    for group in groups:
+        weight = error[group] ** -2
+        mean, spread = float(np.average(value[group], weights=weight)), float(weight.sum() ** -0.5)
+        origin = Origin.SHARED if len(group) > 1 else Origin.MEASURED
+        for k in group:
+            out[k] = _with_thickness(sheets[k], Quantity(value=mean, standard_error=spread, origin=origin))
+    if groups:
+        common = max(groups, key=lambda g: area[g].sum())
+        guess = out[common[0]].thickness.value
+        for k in np.flatnonzero(~seen):
+            unsure = Quantity(value=guess, standard_error=0.3 * guess, origin=Origin.INFERRED)
+            out[k] = _with_thickness(sheets[k], unsure)
+    return tuple(out)
+
+
+def _clusters(members: np.ndarray, value: np.ndarray, error: np.ndarray, sigmas: float) -> list[list[int]]:
+    """Agglomerate from the nearest pair on, while means differ by less than their joint uncertainty allows."""
+    groups = [[int(k)] for k in members]
+    while len(groups) > 1:
+        means = np.array([np.average(value[g], weights=error[g] ** -2.0) for g in groups])
+        order = np.argsort(means, kind="stable")
+        gaps = np.diff(means[order])
+        k = int(np.argmin(gaps))
+        a, b = groups[order[k]], groups[order[k + 1]]
+        if gaps[k] > sigmas * np.hypot(error[a].min(), error[b].min()):
+            break
+        groups = [g for g in groups if g is not a and g is not b] + [a + b]
+    return groups
+
+
+def _with_thickness(sheet: Sheet, thickness: Quantity) -> Sheet:
+    board = sheet.world_from_board.copy()
+    board[:3, 3] += (sheet.thickness.value - thickness.value) * sheet.normal
+    return replace(sheet, world_from_board=board, thickness=thickness)
