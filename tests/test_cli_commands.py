@@ -130,3 +130,43 @@ def test_config_is_written_once_and_used(kerfwright, monkeypatch, tmp_path):
     right = kerfwright("reconstruct", "c", "-o", tmp_path / "out", "--up", "y", "--scale", "-1")
     assert "--scale" in right.stderr, "the command line goes before the file"
     assert kerfwright("config", "--show").returncode == 0
+
+
+def test_evaluate_tells_what_is_missing(kerfwright, sound, tmp_path):
+    truth = demo_capture() / "truth"
+    done = kerfwright("evaluate", tmp_path, truth)
+    assert done.returncode == 0, done.stderr
+    assert "0 of 4 matched, 1 found" in done.stdout and "leg_left" in done.stdout
+    figures = json.loads(kerfwright("evaluate", tmp_path, truth, "--json").stdout)
+    assert figures["parts_true"] == 4 and figures["extra"] == ["a"]
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (("evaluate", "{}", "{}/none"), ["none"]),
+    (("evaluate", "{}", "{}", "--stage", "guess"), ["guess", "identify"]),
+    (("synth", "spaceship", "-o", "{}/out"), ["spaceship", "stool"]),
+    (("synth", "stool", "-o", "{}/out", "--preset", "x"), ["--preset: x", "quick"]),
+    (("synth", "stool", "-o", "{}/out", "--boards", "9"), ["boards: 9"]),
+])
+def test_bad_input_of_the_measuring_commands(kerfwright, sound, tmp_path, arguments, words):
+    done = kerfwright(*(a.format(tmp_path) for a in arguments))
+    assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
+    assert all(word in done.stderr for word in words), done.stderr
+    assert [p.name for p in tmp_path.iterdir()] == ["model.json"]
+
+
+def test_synth_makes_a_capture_that_opens(kerfwright, monkeypatch, tmp_path):
+    from dataclasses import replace
+
+    from kerfwright import synthetic
+
+    quick = synthetic.PRESETS["quick"]
+    dataset = replace(quick.dataset, images=2, width=96, height=72)
+    images = replace(quick.images, floor_texels=64, room_nodes=12, light_rays=4, texels=0.02)
+    tiny = replace(quick, dataset=dataset, images=images, cloud=replace(quick.cloud, points=2000, views=1))
+    monkeypatch.setitem(synthetic.PRESETS, "quick", tiny)
+    done = kerfwright("synth", "single", "-o", tmp_path / "out", "--preset", "quick")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(kerfwright("info", tmp_path / "out", "--json").stdout)
+    assert found["images"] == 2 and found["points"] > 100
+    assert (tmp_path / "out" / "truth" / "truth.json").exists()

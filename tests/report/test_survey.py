@@ -51,7 +51,7 @@ def test_a_good_capture_is_enough_and_measured(tmp_path):
     assert [f.code for f in found.findings] == ["K001"], "only the reader's note"
     assert (found.images, found.points, found.colours, found.image_sizes) == (18, 30_000, False, ("800x600",))
     assert found.widest_gap_deg == pytest.approx(20, abs=0.5) and found.pixel_mm == pytest.approx(0.875, rel=0.02)
-    assert found.extent_mm == pytest.approx((380, 380, 380), abs=1) and found.plain_share < 0.1
+    assert found.extent_mm == pytest.approx((380, 380, 380), abs=1) and found.plain_share < 0.25
 
 
 def test_few_photographs_and_a_side_that_nobody_saw(tmp_path):

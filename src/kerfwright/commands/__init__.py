@@ -11,9 +11,11 @@ from kerfwright.commands.check import check
 from kerfwright.commands.config import config
 from kerfwright.commands.demo import demo
 from kerfwright.commands.doctor import doctor
+from kerfwright.commands.evaluate import evaluate
 from kerfwright.commands.export import export
 from kerfwright.commands.info import info
 from kerfwright.commands.reconstruct import reconstruct
+from kerfwright.commands.synth import synth
 from kerfwright.commands.view import view
 from kerfwright.config import CONFIGURABLE, config_path, read_config
 
@@ -47,5 +49,5 @@ def _common(
         context.default_map = read_config(config_path())
 
 
-for command in (reconstruct, demo, info, view, check, export, doctor, config):
+for command in (reconstruct, demo, info, view, check, export, evaluate, synth, doctor, config):
     app.command()(command)
