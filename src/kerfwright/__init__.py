@@ -1,3 +1,42 @@
-"""From photographs of a piece of carpentry to the plans to build it again."""
+"""From photographs of a piece of carpentry to the plans to build it again.
+
+>>> import kerfwright
+>>> model = kerfwright.reconstruct("my-stool")      # doctest: +SKIP
+>>> [board.name for board in model.boards]          # doctest: +SKIP
+['board_01', 'board_02', 'board_03', 'board_04']
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from kerfwright.model import Model
+
+__all__ = ["__version__", "reconstruct"]
 
 __version__ = "0.1.0"
+
+
+def reconstruct(
+    capture: Path | str, *, up: str = "z", millimetres_per_unit: float | None = None, seed: int = 0
+) -> Model:
+    """Reconstruct the boards of a capture; reads the folder, writes and prints nothing.
+
+    Parameters
+    ----------
+    capture : folder with images, cameras and a cloud.
+    up : axis of the capture that points up: x, y, z, -x, -y or -z.
+    millimetres_per_unit : of the capture; None takes a unit for a metre.
+    seed : of the random generator.
+
+    Raises
+    ------
+    kerfwright.errors.KerfwrightError when the capture cannot be used, or shows nothing that could be a board.
+    """
+    from kerfwright.pipeline import ReconstructOptions
+    from kerfwright.pipeline import reconstruct as run
+
+    return run(capture, ReconstructOptions(up, millimetres_per_unit, seed)).model
