@@ -146,6 +146,12 @@ def test_the_scene_holds_every_board(capture):
     assert edges[0] == 12 and edges[1] == 12, "a box has twelve edges"
 
 
+def test_what_to_photograph_next(capture):
+    text = Page(report_html(MODEL, capture, COLOURS)).text
+    assert "Photograph these next" in text, "two photographs of three boards don't show all"
+    assert re.search(r"\d+° to the (right|left) of [01]\.png", text)
+
+
 def test_without_a_capture_it_shows_the_model_alone():
     page = Page(report_html(MODEL, None, COLOURS))
     assert "photographs" not in page.text.replace("seam in the photographs", "").replace("2 photographs", "")

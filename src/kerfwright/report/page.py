@@ -14,9 +14,10 @@ from kerfwright.model import Model
 from kerfwright.report.cards import boards_section
 from kerfwright.report.deviation import Deviation, deviation
 from kerfwright.report.meshes import board_meshes
+from kerfwright.report.next_views import next_views
 from kerfwright.report.photographs import photographs_section
 from kerfwright.report.scene import scene
-from kerfwright.report.tables import contacts_section, findings_section
+from kerfwright.report.tables import contacts_section, findings_section, next_section
 from kerfwright.report.views import best_views
 
 __all__ = ["report_html"]
@@ -44,7 +45,7 @@ def report_html(model: Model, capture: Capture | None, colours: Sequence[Colour]
         f"<style>{(assets / 'page.css').read_text()}</style></head><body class=\"outline\">",
         _head(model), _stage(cloud, full_scale), photographs_section(views, meshes, colours),
         boards_section(model, colours), contacts_section(model.contacts), findings_section(model.findings),
-        _foot(model),
+        next_section(next_views(meshes, capture.views)) if capture else "", _foot(model),
         f'<script type="application/json" id="scene">{data}</script>',
         f"<script>{(assets / 'viewer.js').read_text()}</script>", "</body></html>", "",
     ])

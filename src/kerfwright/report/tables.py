@@ -1,4 +1,4 @@
-"""The report's tables of contacts and findings."""
+"""The report's tables: contacts, findings, and what to photograph next."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from html import escape
 
 from kerfwright.model import Contact, Finding
+from kerfwright.report.next_views import NextView
 
-__all__ = ["contacts_section", "findings_section"]
+__all__ = ["contacts_section", "findings_section", "next_section"]
 
 _CONTACTS = {1: "edge on face", 2: "edge on face, at a corner", 3: "face on face", 4: "edge on edge"}
 _DECIDED = {"geometry": "geometry", "seam": "seam in the photographs", "default": "no evidence", "inferred": "inferred"}
@@ -35,6 +36,22 @@ def findings_section(findings: Sequence[Finding]) -> str:
     ranked = sorted(findings, key=lambda f: order[f.severity])
     rows = [(f.severity, f.code, f.message, f.remedy) for f in ranked]
     return _table("Findings", ("", "number", "what", "what to do"), rows, classes=[f.severity for f in ranked])
+
+
+def next_section(views: Sequence[NextView]) -> str:
+    """Empty when the photographs show all that can be shown."""
+    rows = [(
+        f"{_side(view.turn)} {view.nearest}", f"{view.elevation:.0f}", f"{view.distance / 1000:.1f}",
+        f"{100 * view.share:.0f}", ", ".join(view.boards),
+    ) for view in views]
+    head = ("stand", "degrees above the floor", "metres from the middle", "% more of the surface", "of boards")
+    return _table("Photograph these next", head, rows, numbers=(1, 2, 3)) if rows else ""
+
+
+def _side(turn: float) -> str:
+    if abs(turn) < 5:
+        return "where you took"
+    return f"{abs(turn):.0f}° to the {'right' if turn > 0 else 'left'} of"
 
 
 def _table(
