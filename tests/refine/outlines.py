@@ -2,9 +2,10 @@
 
 The generator fixes what "right" means before there is a fitter: each outline is a `CutPath` (its truth) and the noisy
 boundary that a traced mask would give: a point a millimetre, displaced by a stationary Gaussian field of `noise` RMS in
-both directions whose correlation falls to 1/e over `correlation_length` along the boundary. Sizes run from 60 to 600 mm.
-Shapes are only kept apart where a person could do so too: arcs have at least 4 mm of sagitta, splines leave every arc and
-line by several millimetres.
+both directions whose correlation falls to 1/e over `correlation_length` along the boundary.
+Sizes run from 60 to 600 mm.
+Shapes are only kept apart where a person could do so too: arcs have 4 mm of sagitta or more, splines leave every arc
+and line by several millimetres.
 """
 
 from __future__ import annotations

@@ -1,0 +1,101 @@
+"""A boundary as evenly spaced samples with weights that know how few of them are independent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from kerfwright.errors import StageError
+from kerfwright.refine.types import BoundaryLoop
+
+__all__ = ["Samples", "resample"]
+
+MOST_SAMPLES = 2400
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """A closed boundary at even spacing along itself, mm.
+
+    `weight` (N,) turns squared distances (mm2) into chi-square of effective observations: spacing / (2 l sigma^2)
+    with the correlation length l.
+    """
+
+    points: np.ndarray  # (N, 2)
+    sigma: np.ndarray  # (N,)
+    weight: np.ndarray  # (N,)
+    spacing: float
+    correlation: float
+
+    @property
+    def count(self) -> int:
+        """Number of samples."""
+        return len(self.points)
+
+    @property
+    def length(self) -> float:
+        """Perimeter."""
+        return self.count * self.spacing
+
+    @property
+    def observations(self) -> float:
+        """Effective number of independent observations."""
+        return max(self.length / (2 * self.correlation), 3.0)
+
+    def steps(self, millimetres: float) -> int:
+        """Millimetres along the boundary as a number of samples, at least one."""
+        return max(1, round(millimetres / self.spacing))
+
+    @cached_property
+    def moments(self) -> np.ndarray:
+        """(2N + 1, 10) running sums, twice round, of w, wx, wy, wxx, wxy, wyy, wxz, wyz, wzz, ws2 with z = x^2 +
+        y^2.
+        """
+        x, y = self.points.T
+        z = x**2 + y**2
+        rows = np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y, x * z, y * z, z * z]) * self.weight[:, None]
+        rows = np.column_stack([rows, self.sigma**2])
+        return np.vstack([np.zeros(10), np.cumsum(np.vstack([rows, rows]), axis=0)])
+
+    def directions(self, reach: float) -> np.ndarray:
+        """(N, 2) unit directions along the boundary from chords over +- `reach` mm."""
+        k = self.steps(reach)
+        chord = np.roll(self.points, -k, axis=0) - np.roll(self.points, k, axis=0)
+        return chord / np.maximum(np.linalg.norm(chord, axis=1, keepdims=True), 1e-12)
+
+
+def resample(loop: BoundaryLoop, correlation_length: float) -> Samples:
+    """Samples about 1/5 of the correlation length apart, or as far as the boundary's own points if these are closer.
+
+    Raises
+    ------
+    StageError
+        If the loop has fewer than three different points, or a standard error is not positive.
+    """
+    points, sigma = _distinct(np.asarray(loop.points, float), np.asarray(loop.standard_error, float))
+    if len(points) < 3:
+        raise StageError(f"boundary loop: points: {len(points)} different ones found: a loop needs at least 3")
+    if not (np.isfinite(points).all() and np.all(sigma > 0)):
+        raise StageError(
+            "boundary loop: standard_error: found values that are not positive: give mm across the boundary"
+        )
+    steps = np.linalg.norm(np.diff(np.vstack([points, points[:1]]), axis=0), axis=1)
+    length = np.concatenate([[0.0], np.cumsum(steps)])
+    native = float(np.median(steps))
+    spacing = max(length[-1] / MOST_SAMPLES, min(max(native, correlation_length / 20), correlation_length / 5))
+    count = max(12, round(length[-1] / spacing))
+    at = np.arange(count) * length[-1] / count
+    closed, closed_sigma = np.vstack([points, points[:1]]), np.append(sigma, sigma[0])
+    even = np.column_stack([np.interp(at, length, closed[:, k]) for k in range(2)])
+    even_sigma = np.interp(at, length, closed_sigma)
+    correlation = max(correlation_length, native / 2)
+    weight = length[-1] / count / (2 * correlation * even_sigma**2)
+    return Samples(even, even_sigma, weight, length[-1] / count, correlation)
+
+
+def _distinct(points: np.ndarray, sigma: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Without points that repeat the one before."""
+    keep = np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1) > 1e-9
+    return points[keep], np.broadcast_to(sigma, len(points))[keep]

@@ -1,0 +1,181 @@
+"""Fit all unknowns of a closed chain at once: least orthogonal distances, robustly, with equations that hold exactly.
+
+Gauss-Newton steps in the null space of the equations' Jacobian. The null space comes from a rank-revealing
+decomposition, so equations may repeat each other, which would make an interior-point solver fail.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfwright.refine.curves.ranges import CUBIC
+from kerfwright.refine.curves.samples import Samples
+from kerfwright.refine.curves.shape import Shape, equations, feet, residuals
+from kerfwright.refine.curves.snap import GuideLine
+
+__all__ = ["Equations", "Fit", "distances", "solve"]
+
+ROBUST = 4.0  # standard errors at which an observation has lost three quarters of its weight (Geman-McClure)
+_RANK = 1e-9
+Equations = Callable[[Shape], tuple[np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A fitted chain: plain and robust chi-square, signed distances and edges of the samples, covariance of the
+    unknowns.
+    """
+
+    shape: Shape
+    chi2: float
+    robust: float
+    distance: np.ndarray  # (N,)
+    edge: np.ndarray  # (N,)
+    covariance: np.ndarray
+    violation: float
+
+
+def distances(shape: Shape, samples: Samples) -> tuple[np.ndarray, np.ndarray]:
+    """Signed distance (N,) and edge (N,) of each sample; the nearest of the edge of its range and that one's
+    neighbours.
+    """
+    best = np.full(samples.count, np.inf)
+    edge = np.zeros(samples.count, int)
+    member = _membership(shape, samples.count)
+    for k in range(shape.count):
+        near = {(k - 1) % shape.count, k, (k + 1) % shape.count}
+        mine = np.flatnonzero(np.isin(member, list(near)))
+        if not len(mine):
+            continue
+        _, at, signed = feet(shape, k, samples.points[mine])
+        gap = np.linalg.norm(samples.points[mine] - at, axis=1)
+        gap = np.where(member[mine] == k, gap, gap + 1e-6)
+        better = gap < np.abs(best[mine])
+        best[mine[better]], edge[mine[better]] = np.copysign(gap, signed)[better], k
+    return best, edge
+
+
+def _membership(shape: Shape, count: int) -> np.ndarray:
+    member = np.zeros(count, int)
+    for k, (first, last) in enumerate(shape.ranges):
+        member[np.arange(first, last) % count] = k
+    return member
+
+
+def solve(
+    shape: Shape, samples: Samples, guides: list[GuideLine], extra: Equations | None = None, steps: int = 25
+) -> Fit:
+    """The best unknowns for the structure of `shape`; `extra` gives more equations than the structure's own."""
+    both = _all_equations(guides, extra)
+    damping, best = 1e-3, None
+    system = _system(shape, samples)
+    for _ in range(steps):
+        value, jacobian = both(shape)
+        step, covariance = _step(*system[:2], value, jacobian, damping)
+        limit = 0.2 * samples.length / max(shape.count, 4)
+        step *= min(1.0, limit / max(float(np.abs(step[: 2 * shape.count]).max()), 1e-12))
+        trial = shape.moved(shape.unknowns + step)
+        trial_system = _system(trial, samples)
+        merit = _merit(trial_system[2], both(trial)[0], samples)
+        if best is None or merit <= best * (1 + 1e-9) + 1e-9:
+            shape, system, damping = trial, trial_system, max(damping / 5, 1e-9)
+            small = best is not None and best - merit < 1e-4 * max(1.0, best) and np.abs(step).max() < 1e-2
+            best = merit
+            if small:
+                break
+        else:
+            damping *= 8
+            if damping > 1e3:
+                break
+    return _finished(shape, samples, both, covariance)
+
+
+def _all_equations(guides: list[GuideLine], extra: Equations | None) -> Equations:
+    def every(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+        value, jacobian = equations(shape, guides)
+        if extra is None:
+            return value, jacobian
+        more, slope = extra(shape)
+        return np.concatenate([value, more]), np.vstack([jacobian, slope])
+
+    return every
+
+
+def _merit(robust: float, violation: np.ndarray, samples: Samples) -> float:
+    return robust + 1e3 * float(np.abs(violation).sum()) / max(float(np.median(samples.sigma)), 1e-6)
+
+
+def _system(shape: Shape, samples: Samples) -> tuple[np.ndarray, np.ndarray, float]:
+    """Normal matrix and right side of the robust least squares, and the robust chi-square."""
+    unknowns = len(shape.unknowns)
+    normal, right, chi2 = np.zeros((unknowns, unknowns)), np.zeros(unknowns), 0.0
+    _, edge = distances(shape, samples)
+    for k in range(shape.count):
+        mine = np.flatnonzero(edge == k)
+        if not len(mine):
+            continue
+        r, slope = residuals(shape, k, samples.points[mine])
+        ratio = 1 + (r / (ROBUST * samples.sigma[mine])) ** 2
+        weight = samples.weight[mine] / ratio**2
+        chi2 += float((samples.weight[mine] * r**2 / ratio).sum())
+        columns = shape.columns(k)
+        normal[np.ix_(columns, columns)] += slope.T @ (weight[:, None] * slope)
+        right[columns] -= slope.T @ (weight * r)
+    for k in range(shape.count):
+        if shape.kinds[k] == CUBIC:
+            _handles(shape, k, normal, right)
+    return normal, right, chi2
+
+
+def _handles(shape: Shape, k: int, normal: np.ndarray, right: np.ndarray) -> None:
+    """A weak pull of control points towards thirds of the chord: nothing else holds them along a flat curve."""
+    columns, control = shape.columns(k), shape.controls(k)
+    chord = max(float(np.linalg.norm(control[3] - control[0])), 1e-6)
+    for row, thirds in ((4, 1 / 3), (6, 2 / 3)):
+        target = control[0] + thirds * (control[3] - control[0])
+        for d in range(2):
+            normal[columns[row + d], columns[row + d]] += 0.25 / chord**2
+            right[columns[row + d]] += 0.25 / chord**2 * (target[d] - shape.unknowns[columns[row + d]])
+
+
+def _step(
+    normal: np.ndarray, right: np.ndarray, value: np.ndarray, jacobian: np.ndarray, damping: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Step that brings the equations to zero in first order and lowers the sum of squares, and the covariance."""
+    unknowns = len(right)
+    particular, basis = np.zeros(unknowns), np.eye(unknowns)
+    if len(value):
+        u, s, vt = np.linalg.svd(jacobian, full_matrices=True)
+        rank = int((s > _RANK * max(s[0], 1e-12)).sum())
+        particular = -vt[:rank].T @ ((u[:, :rank].T @ value) / s[:rank])
+        basis = vt[rank:].T
+    reduced = basis.T @ normal @ basis
+    scale = np.diag(np.maximum(np.diag(reduced), 1e-9))
+    move = np.linalg.lstsq(reduced + damping * scale, basis.T @ (right - normal @ particular), rcond=1e-12)[0]
+    covariance = basis @ np.linalg.pinv(reduced + 1e-9 * scale, hermitian=True) @ basis.T
+    return particular + basis @ move, covariance
+
+
+def _finished(shape: Shape, samples: Samples, both: Equations, covariance: np.ndarray) -> Fit:
+    """Bring the equations to rounding error by least moves, then take stock."""
+    for _ in range(8):
+        value, jacobian = both(shape)
+        if not len(value) or np.abs(value).max() < 1e-13:
+            break
+        step = np.linalg.lstsq(jacobian, -value, rcond=_RANK)[0]
+        shape = shape.moved(shape.unknowns + step)
+    value, _ = both(shape)
+    distance, edge = distances(shape, samples)
+    ratio = 1 + (distance / (ROBUST * samples.sigma)) ** 2
+    return Fit(
+        shape,
+        float((samples.weight * distance**2).sum()),
+        float((samples.weight * distance**2 / ratio).sum()),
+        distance,
+        edge,
+        covariance,
+        float(np.abs(value).max(initial=0.0)),
+    )
