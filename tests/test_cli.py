@@ -270,3 +270,9 @@ def test_a_second_run_on_the_same_folder_is_refused(tmp_path):
     first.wait(5)
     assert second.returncode == 2 and f"process {first.pid} is writing" in second.stderr
     assert run(fake("reconstruct", "c", "-o", tmp_path / "out")).returncode == 0, "the lock goes with its holder"
+
+
+def test_jobs_bounds_the_cores(tmp_path):
+    action = "import os; print('cores', len(os.sched_getaffinity(0)), os.environ.get('OMP_NUM_THREADS'))"
+    done = run(fake("reconstruct", "c", "-o", tmp_path / "out", "-q", "-j", 1, action=action))
+    assert done.stdout == "cores 1 1\n", done.stderr

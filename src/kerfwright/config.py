@@ -25,7 +25,7 @@ _OPTIONS: dict[str, dict[str, tuple[type | tuple[type, ...], str | None, str]]] 
         "up": (str, '"z"', "axis of the capture that is up: x, y, z, -x, -y, -z"),
         "scale": ((int, float), None, "millimetres a capture unit; not set: a unit is a metre, and the report says so"),
         "seed": (int, "0", "of the random generator"),
-        "jobs": (int, None, "threads; not set: all cores"),
+        "jobs": (int, None, "cores to use; not set: all"),
         "quiet": (bool, "false", "say nothing but errors"),
         "verbose": (bool, "false", "say more"),
     },

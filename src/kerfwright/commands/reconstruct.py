@@ -23,7 +23,9 @@ __all__ = ["ScaleMm", "Up", "checked_axis", "checked_scale", "reconstruct", "run
 
 _UP = ("x", "y", "z", "-x", "-y", "-z")
 # Read by the numeric libraries when they are first imported.
-_THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+_THREAD_VARIABLES = (
+    "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENCV_FOR_THREADS_NUM",
+)
 
 Out = Annotated[Path, typer.Option("-o", "--out", metavar="OUT", help="Folder for the results; made if need be.")]
 Up = Annotated[str, typer.Option("--up", metavar="AXIS", help="Axis of the capture that is up: x, y, z, -x, -y, -z.")]
@@ -33,7 +35,7 @@ ScaleMm = Annotated[
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Of the random generator; the same seed, the same files.")]
 Jobs = Annotated[
-    int | None, typer.Option("-j", "--jobs", min=1, help="Threads; all cores if not said. The results are the same.")
+    int | None, typer.Option("-j", "--jobs", min=1, help="Cores to use; all if not said. The results are the same.")
 ]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing but errors.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Progress as one JSON object a line, on standard output.")]
@@ -130,5 +132,9 @@ def checked_scale(scale: float | None) -> float | None:
 
 
 def _limit_threads(jobs: int | None) -> None:
-    if jobs is not None:
-        os.environ.update(dict.fromkeys(_THREAD_VARIABLES, str(jobs)))
+    """Keep this process, and what it starts, to as many cores; libraries that count cores are told as well."""
+    if jobs is None:
+        return
+    os.environ.update(dict.fromkeys(_THREAD_VARIABLES, str(jobs)))
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:jobs])
