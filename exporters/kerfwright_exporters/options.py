@@ -29,6 +29,11 @@ class ExportOptions:
     kerf: float = 0.0  # width of the cut; above 0 the path of the tool's centre is drawn beside the original
     relief: Literal["none", "dogbone", "tbone"] = "none"  # in inside corners
     tool_diameter: float = 6.0  # of the bit that makes the relief
+    sheet_length: float = 2440.0  # of the stock sheets, along the grain
+    sheet_width: float = 1220.0
+    sheet_margin: float = 10.0  # of a sheet's border that is not used
+    spacing: float = 6.0  # between boards on a sheet; the kerf, where that is wider
+    grain: bool = False  # keep every board's x axis along the grain, which runs along the sheet
     mesh_tolerance: float = 0.1  # chord error of triangle meshes
 
     def __post_init__(self) -> None:
@@ -37,7 +42,10 @@ class ExportOptions:
         self._choose("relief", "none", "dogbone", "tbone")
         for name in ("arc_tolerance", "mesh_tolerance", "tool_diameter"):
             self._require(name, 0.0, inclusive=False)
-        self._require("kerf", 0.0)
+        for name in ("sheet_length", "sheet_width"):
+            self._require(name, 2 * max(0.0, self.sheet_margin), inclusive=False)
+        for name in ("kerf", "sheet_margin", "spacing"):
+            self._require(name, 0.0)
         if self.kerf and self.splines:
             raise OptionError("splines: True: a spline has no exact path beside it: give either kerf or splines")
 

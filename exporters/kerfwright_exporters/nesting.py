@@ -1,0 +1,162 @@
+"""Boards on sheets: bottom-left placement on a raster, over many orders of the boards.
+
+The sheet is a raster of cells, column by column; a board is, for each column it covers, the runs of cells it needs.
+Where a run meets an occupied cell, the board jumps past it. Hundreds of orders are tried on a coarse raster (simulated
+annealing over the order, Kirkpatrick et al., Science 220, 1983), and the best of them laid again on a fine one. Cells
+are counted as covered when the board, grown by half the spacing, touches them: what fits on the raster fits on the
+sheet. Holes of boards are free cells, and small boards go into them.
+
+The search counts layouts, not seconds: the same boards give the same sheets on any machine. spyrrow packs a strip as
+tightly, but stops by the clock, and knows neither sheets nor holes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from kerfwright_exporters._raster import place_all
+
+if TYPE_CHECKING:
+    from shapely.geometry import Polygon
+
+__all__ = ["NestOptions", "Place", "nest"]
+
+WARMTH = 0.02  # of the cost: how much worse a layout the search takes at its start
+
+
+@dataclass(frozen=True)
+class NestOptions:
+    """How boards are laid on sheets; lengths in mm."""
+
+    length: float
+    width: float
+    spacing: float  # least distance of two boards
+    turns: tuple[int, ...] = (0, 90, 180, 270)  # degrees that a board may be turned by
+    layouts: int = 400  # orders tried on the coarse raster; one takes a few milliseconds for 30 boards
+    finalists: int = 12  # best orders laid again on the fine raster
+    coarse: int = 200  # cells across the width: 6 mm on a sheet of 1220
+    fine: int = 600  # 2 mm; finer is slower and hardly tighter
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a board lies: x_in_sheet = turn(x_in_board) + shift; turn in degrees, shift in mm; sheets from 0."""
+
+    sheet: int
+    turn: int
+    shift: tuple[float, float]
+
+
+def nest(outlines: list[Polygon], options: NestOptions) -> list[Place]:
+    """A place for every outline, mm, on as few sheets as it finds, the last one as empty as it finds.
+
+    Raises
+    ------
+    ValueError
+        If an outline is too large for a sheet at any allowed turn; its index is the argument.
+    """
+    if not outlines:
+        return []
+    fine = _Raster(outlines, options, options.fine)
+    finalists = [order for _, order in _search(_Raster(outlines, options, options.coarse), outlines, options)]
+    return fine.places(min(finalists, key=fine.cost))
+
+
+def _search(raster: _Raster, outlines: list[Polygon], options: NestOptions) -> list[tuple[float, np.ndarray]]:
+    """Cost and order of the best layouts found on the coarse raster, best first."""
+    rng = np.random.default_rng(options.seed)
+    seen = [(raster.cost(order), order) for order in _starts(outlines)]
+    current, order = min(seen, key=lambda entry: entry[0])
+    for trial in range(options.layouts if len(outlines) > 1 else 0):
+        warmth = WARMTH * current * (1 - trial / options.layouts)
+        candidate = _neighbour(order, rng)
+        found = raster.cost(candidate)
+        if found <= current or rng.random() < np.exp((current - found) / warmth):
+            current, order = found, candidate
+            seen.append((found, candidate))
+    return sorted(seen, key=lambda entry: entry[0])[: options.finalists]
+
+
+def _starts(outlines: list[Polygon]) -> list[np.ndarray]:
+    """Orders that often do well: by area, by the longer side, by the shorter side, largest first."""
+    spans = np.array([np.ptp(np.array(o.exterior.coords), axis=0) for o in outlines])
+    keys = (np.array([o.area for o in outlines]), spans.max(axis=1), spans.min(axis=1))
+    return [np.argsort(-key, kind="stable") for key in keys]
+
+
+def _neighbour(order: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """The order with two boards swapped, or one taken to another place."""
+    a, b = rng.choice(len(order), 2, replace=False)
+    changed = order.copy()
+    if rng.random() < 0.5:
+        changed[[a, b]] = changed[[b, a]]
+        return changed
+    return np.insert(np.delete(changed, a), b, order[a])
+
+
+class _Raster:
+    """The outlines in cells, at every turn; the sheet is grown like them by half the spacing on every side."""
+
+    def __init__(self, outlines: list[Polygon], options: NestOptions, cells: int) -> None:
+        self.options = options
+        self.cell = (options.width + options.spacing) / cells
+        columns = int((options.length + options.spacing) / self.cell + 1e-9)
+        shapes = [[self._shape(outline, turn) for turn in options.turns] for outline in outlines]
+        self.corners = [[corner for _, corner in row] for row in shapes]
+        runs = [r for row in shapes for r, _ in row]
+        self.starts = np.cumsum([0, *(len(r) for r in runs)]).astype(np.int64)
+        self.runs = np.concatenate(runs).astype(np.int64)
+        self.free = np.empty((len(outlines), columns, cells), np.int16)
+        self._require_room(len(outlines), runs)
+
+    def _require_room(self, count: int, runs: list[np.ndarray]) -> None:
+        _, columns, cells = self.free.shape
+        fits = [r[:, 0].max() < columns and r[:, 2].max() <= cells for r in runs]
+        turns = len(self.options.turns)
+        for k in range(count):
+            if not any(fits[k * turns : (k + 1) * turns]):
+                raise ValueError(k)
+
+    def _shape(self, outline: Polygon, turn: int) -> tuple[np.ndarray, np.ndarray]:
+        """Runs (N, 3) of the grown outline, the longest first, and where its cell 0, 0 lies, mm."""
+        import shapely
+        from shapely import affinity
+
+        turned = affinity.rotate(outline, turn, origin=(0, 0))
+        grown = turned.buffer(self.options.spacing / 2, join_style="mitre", mitre_limit=2.0)
+        low, high = np.array(grown.bounds).reshape(2, 2)
+        columns, rows = np.ceil((high - low) / self.cell - 1e-6).astype(int)
+        x, y = np.meshgrid(low[0] + self.cell * np.arange(columns), low[1] + self.cell * np.arange(rows), indexing="ij")
+        shapely.prepare(grown)
+        slack = 1e-6 * self.cell  # cells that the outline only touches are free
+        boxes = shapely.box(x + slack, y + slack, x + self.cell - slack, y + self.cell - slack)
+        runs = _runs(shapely.intersects(grown, boxes))
+        return runs[np.argsort(runs[:, 1] - runs[:, 2], kind="stable")], low
+
+    def cost(self, order: np.ndarray) -> float:
+        """Sheets before the last one, and the share of the last one's length that is used."""
+        sheet, _, _, _, end = place_all(order, self.runs, self.starts, len(self.options.turns), self.free)
+        last = sheet.max()
+        return float(last + end[sheet == last].max() / self.free.shape[1])
+
+    def places(self, order: np.ndarray) -> list[Place]:
+        """The places that an order gives, by board."""
+        sheet, turn, x, y, _ = place_all(order, self.runs, self.starts, len(self.options.turns), self.free)
+        found = []
+        for k in range(len(order)):
+            corner = np.array([x[k], y[k]]) * self.cell - self.options.spacing / 2
+            shift = corner - self.corners[k][turn[k]]
+            found.append(Place(int(sheet[k]), self.options.turns[turn[k]], (float(shift[0]), float(shift[1]))))
+        return found
+
+
+def _runs(covered: np.ndarray) -> np.ndarray:
+    """Runs (N, 3) of column, first cell and cell after the last, of a mask (columns, cells)."""
+    edges = np.diff(np.pad(covered.astype(np.int8), ((0, 0), (1, 1))), axis=1)
+    column, first = np.nonzero(edges == 1)
+    _, last = np.nonzero(edges == -1)
+    return np.stack([column, first, last], axis=1)

@@ -1,0 +1,116 @@
+"""Cut sheets as a PDF: one page a sheet, drawn to a round scale, with names and sizes."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from kerfwright.model import Model
+from kerfwright.model.geometry import sample_loop
+from kerfwright_exporters.cutlist import length_text
+from kerfwright_exporters.naming import STAMP, title
+from kerfwright_exporters.options import ExportOptions
+
+if TYPE_CHECKING:
+    from kerfwright_exporters.sheets import LaidBoard, Sheet
+
+__all__ = ["sheets_pdf"]
+
+PAGE = (297.0, 210.0)  # A4 across, mm
+BORDER, HEAD = 12.0, 16.0  # mm round the drawing, and for the title above it
+SCALES = (1, 2, 5, 10, 20, 25, 50, 100)
+_COLOURS = {"outside": (0, 0, 0), "inside": (0, 0, 0.8), "bevel": (0.8, 0, 0)}
+
+
+def sheets_pdf(model: Model, sheets: list[Sheet], options: ExportOptions) -> bytes:
+    """The bytes of the file; the same sheets give the same bytes."""
+    from reportlab.lib.units import mm
+    from reportlab.pdfgen.canvas import Canvas
+
+    stream = io.BytesIO()
+    canvas = Canvas(stream, pagesize=(PAGE[0] * mm, PAGE[1] * mm), invariant=1)
+    canvas.setTitle(f"Cut sheets: {title(model, options.unverified)}")
+    for sheet in sheets:
+        canvas.scale(mm, mm)
+        _page(canvas, model, sheet, options)
+        canvas.showPage()
+    canvas.save()
+    return stream.getvalue()
+
+
+def _page(canvas: Any, model: Model, sheet: Sheet, options: ExportOptions) -> None:
+    from kerfwright_exporters.sheets import caption
+
+    scale = _scale(sheet)
+    canvas.setFont("Helvetica-Bold", 4.5)
+    canvas.drawString(BORDER, PAGE[1] - BORDER, title(model, False))
+    canvas.setFont("Helvetica", 3.5)
+    canvas.drawString(BORDER, PAGE[1] - BORDER - 6, f"{caption(sheet, options)}. Scale 1:{scale}. Grain runs across.")
+    if options.unverified:
+        canvas.setFillColorRGB(0.8, 0, 0)
+        canvas.drawRightString(PAGE[0] - BORDER, PAGE[1] - BORDER, STAMP)
+        canvas.setFillColorRGB(0, 0, 0)
+    canvas.translate(BORDER, BORDER)
+    canvas.setLineWidth(0.25)
+    canvas.setStrokeColorRGB(0.5, 0.5, 0.5)
+    canvas.rect(0, 0, sheet.length / scale, sheet.width / scale)
+    for board in sheet.boards:
+        _board(canvas, board, scale, options)
+
+
+def _scale(sheet: Sheet) -> int:
+    """The first round scale at which the sheet fits the page."""
+    room = (PAGE[0] - 2 * BORDER, PAGE[1] - 2 * BORDER - HEAD)
+    needed = max(sheet.length / room[0], sheet.width / room[1])
+    return next((s for s in SCALES if s >= needed), SCALES[-1])
+
+
+def _board(canvas: Any, board: LaidBoard, scale: int, options: ExportOptions) -> None:
+    canvas.setLineWidth(0.2)
+    for cut in board.drawing.cuts:
+        if cut.operation in _COLOURS:
+            canvas.setStrokeColorRGB(*_COLOURS[cut.operation])
+            _outline(canvas, sample_loop(cut.loop, 0.02 * scale) / scale)
+    canvas.setStrokeColorRGB(*_COLOURS["bevel"])
+    for bevel in board.drawing.bevels:
+        canvas.line(*(np.array([*bevel.start, *bevel.end]) / scale))
+    for text in board.drawing.texts:
+        if text.operation == "label":
+            _label(canvas, board, text, scale, options)
+        elif text.operation == "bevel":
+            _text(canvas, text.text, np.array(text.at) / scale, max(1.2, text.height / scale), text.turn)
+
+
+def _outline(canvas: Any, points: np.ndarray) -> None:
+    path = canvas.beginPath()
+    path.moveTo(*points[0])
+    for point in points[1:]:
+        path.lineTo(*point)
+    path.close()
+    canvas.drawPath(path)
+
+
+def _label(canvas: Any, board: LaidBoard, text: Any, scale: int, options: ExportOptions) -> None:
+    """Name and size, one above the other, along the board's longer side as it lies."""
+    at = np.array(text.at) / scale
+    size = " x ".join(length_text(v, options) for v in board.size)
+    height = float(np.clip(0.35 * min(board.size) / scale, 1.2, 3.0))
+    length = max(board.size) / scale
+    height = min(height, max(0.8, 1.6 * length / max(len(size), len(board.name))))
+    turn = text.turn if board.size[0] >= board.size[1] else text.turn + np.pi / 2
+    if np.cos(turn) < -1e-6 or np.sin(turn) < -0.999:  # never upside down
+        turn += np.pi
+    up = np.array([-np.sin(turn), np.cos(turn)])
+    _text(canvas, board.name, at + 0.65 * height * up, height, turn)
+    _text(canvas, size, at - 0.65 * height * up, 0.85 * height, turn)
+
+
+def _text(canvas: Any, text: str, at: np.ndarray, height: float, turn: float) -> None:
+    canvas.saveState()
+    canvas.setFont("Helvetica", height)
+    canvas.translate(*at)
+    canvas.rotate(float(np.degrees(turn)))
+    canvas.drawCentredString(0, -0.35 * height, text)
+    canvas.restoreState()
