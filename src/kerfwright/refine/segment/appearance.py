@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Mixture", "fit_mixture"]
+__all__ = ["Mixture", "fit_mixture", "same_surface"]
 
 FLOOR_VARIANCE = 2.0  # LAB units squared: sensor noise and JPEG; keeps flat colours from becoming spikes
 UNIFORM = np.log(1e-7)  # density of an unforeseen colour: LAB holds about 1e6 to 1e7 cubic units
 EM_STEPS = 6
+SAME_VARIANCE = 16.0  # LAB units squared: one point seen by two views, after exposure was evened out
+SAME_SHARE = 0.05  # prior share of colours inside that the mixture doesn't know
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,22 +25,34 @@ class Mixture:
 
     def log_density(self, colours: np.ndarray) -> np.ndarray:
         """(N, 3) to (N,), all colours and components in one product."""
-        return np.logaddexp(_logsumexp(self._joint(colours)), UNIFORM)
+        return np.logaddexp(_logsumexp(self._joint(colours)), np.float32(UNIFORM))
 
     def _joint(self, colours: np.ndarray) -> np.ndarray:
+        """(k, N) log of weight times density."""
         k = len(self.weights)
         stacked = self.whitening.reshape(3 * k, 3)
         offset = np.einsum("kij,kj->ki", self.whitening, self.means).reshape(3 * k)
-        z = colours.astype(np.float32) @ stacked.T.astype(np.float32) - offset.astype(np.float32)
-        squared = (z * z).reshape(-1, k, 3).sum(2)
+        z = stacked.astype(np.float32) @ colours.astype(np.float32).T - offset.astype(np.float32)[:, None]
+        z *= z
+        squared = z[0::3] + z[1::3] + z[2::3]
         log_det = np.log(np.abs(np.linalg.det(self.whitening)))
         constant = np.log(self.weights) + log_det - 1.5 * np.log(2 * np.pi)
-        return constant.astype(np.float32) - 0.5 * squared
+        return constant.astype(np.float32)[:, None] - np.float32(0.5) * squared
 
 
 def _logsumexp(values: np.ndarray) -> np.ndarray:
-    top = values.max(1)
-    return top + np.log(np.exp(values - top[:, None]).sum(1))
+    top = values.max(0)
+    return top + np.log(np.exp(values - top).sum(0))
+
+
+def same_surface(colours: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """(N,) log density of (N, 3) colours if they are of one surface point with the other views' mean (NaN: no other view).
+
+    Only what lies on the sheet plane keeps its colour from view to view: a knot does, a dark patch of the carpet doesn't.
+    """
+    squared = ((colours - others) ** 2).sum(1) / SAME_VARIANCE
+    log_density = np.log(SAME_SHARE) - 0.5 * squared - 1.5 * np.log(2 * np.pi * SAME_VARIANCE)
+    return np.where(np.isfinite(squared), log_density, -np.inf).astype(np.float32)
 
 
 def fit_mixture(colours: np.ndarray, components: int, samples: int, rng: np.random.Generator) -> Mixture | None:
@@ -49,7 +63,7 @@ def fit_mixture(colours: np.ndarray, components: int, samples: int, rng: np.rand
     mixture = _mixture(picked, _one_hot(_nearest(picked, components)))
     for _ in range(EM_STEPS):
         joint = mixture._joint(picked)
-        mixture = _mixture(picked, np.exp(joint - _logsumexp(joint)[:, None]))
+        mixture = _mixture(picked, np.exp(joint - _logsumexp(joint)).T)
     return mixture
 
 

@@ -14,14 +14,23 @@ from kerfwright.capture.types import Capture
 from kerfwright.errors import OptionError
 from kerfwright.identify.types import Sheet
 from kerfwright.refine.segment.boundary import Chain, chain_of, loops_of, registration, settle, snap
-from kerfwright.refine.segment.constraints import Limit, carve, limits_of
+from kerfwright.refine.segment.constraints import Limit, carve, limits_of, margins, promises
 from kerfwright.refine.segment.edges import EdgeScan, scan_edges
-from kerfwright.refine.segment.evidence import ViewEvidence, average, classes_on_grid, cut_face_band, gather, grown, seeds_of
+from kerfwright.refine.segment.evidence import (
+    ViewEvidence,
+    average,
+    classes_on_grid,
+    cut_face_band,
+    gather,
+    grown,
+    means_of_others,
+    seeds_of,
+)
 from kerfwright.refine.segment.graphcut import contrast, cut, smoothness_weights
 from kerfwright.refine.segment.grid import Grid, grid_over
 from kerfwright.refine.segment.options import BoardOutlines, SegmentOptions
 from kerfwright.refine.segment.rectify import Photos, even_out, rectify
-from kerfwright.refine.segment.scene import Occluders
+from kerfwright.refine.segment.scene import OCCLUDED, Occluders
 from kerfwright.refine.segment.topology import clean, pieces
 from kerfwright.refine.segment.views import BoardView, choose_views
 from kerfwright.refine.types import Outline
@@ -47,6 +56,7 @@ class _Board:
     crossing: np.ndarray
     masks: list[np.ndarray]  # one a piece
     regions: list[Polygon]  # the same as polygons
+    beyond: np.ndarray  # just past the segments it is known to touch: there the outline's error has no say
     left_out: tuple[str, ...] = ()
 
     @property
@@ -101,12 +111,15 @@ def _begin(
     views = choose_views(sheet, idx, capture.views, occluders, options) if options.use_images else []
     densities = [v.density for v in views] or [1.0]
     pixel = options.pixel or float(np.clip(1 / np.median(densities), options.min_pixel, options.max_pixel))
-    grid = grid_over(sheet.region, options.search_margin + 4 * pixel, pixel, options.max_grid)
     limits = limits_of(constraints, sheet.thickness.value, CORNER_REACH * sheet.thickness.value)
+    promised = promises(limits, sheet.region, options.contact_reach)
+    grid = grid_over(sheet.region.union(promised), options.search_margin + 4 * pixel, pixel, options.max_grid)
     excluded, crossing = carve(limits, grid)
-    mask = grid.mask(sheet.region)
+    region = sheet.region.union(promised).buffer(0)
+    mask = grid.mask(region) & ~excluded
     shifts = [np.zeros(2) for _ in views]
-    return _Board(idx, sheet, limits, grid, views, shifts, excluded, crossing, [mask], [sheet.region])
+    return _Board(idx, sheet, limits, grid, views, shifts, excluded, crossing, [mask], [sheet.region],
+                  grid.mask(margins(limits, 2 * options.outline_error)))
 
 
 def _round(
@@ -119,7 +132,7 @@ def _round(
     error = options.outline_error if first else options.refined_error
     margin = options.search_margin if first else options.outline_error
     forbidden = board.excluded | _taken(board, boards, error)
-    seeds = seeds_of(board.mask, forbidden, error, margin, board.grid.pixel)
+    seeds = seeds_of(board.mask, board.beyond, forbidden, error, margin, board.grid.pixel)
     if not seeds.inside.any():
         return replace(board, views=[], shifts=[])
     evidences, contrasts = _evidence(board, seeds, error, occluders, photos, options)
@@ -136,19 +149,19 @@ def _round(
 
 def _taken(board: _Board, boards: Sequence[_Board], error: float) -> np.ndarray:
     """Pixels whose point half way through the board lies inside another board, its margin of error taken off."""
-    centres = board.grid.centres().reshape(-1, 2)
-    height = board.sheet.thickness.value / 2
-    in_world = board.sheet.to_world(np.column_stack([centres, np.full(len(centres), height)]))
-    taken = np.zeros(len(centres), bool)
+    taken = np.zeros(board.grid.shape, bool)
     for other in boards:
         if other.idx == board.idx:
             continue
-        core = grown(other.mask & ~other.excluded, -error, other.grid.pixel)
-        at = other.sheet.to_board(in_world)
-        depth = np.minimum(at[:, 2], other.sheet.thickness.value - at[:, 2])
+        other_from_board = np.linalg.inv(other.sheet.world_from_board) @ board.sheet.world_from_board
+        middle = other_from_board @ [0, 0, board.sheet.thickness.value / 2, 1]
+        at = board.grid.affine(np.column_stack([other_from_board[:3, :2], middle[:3]]))
+        depth = np.minimum(at[2], other.sheet.thickness.value - at[2])
         near = depth > min(1.0, other.sheet.thickness.value / 8)
-        taken[near] |= other.grid.lookup(core, at[near, :2], False)
-    return taken.reshape(board.grid.shape)
+        if near.any():
+            core = grown(other.mask & ~other.excluded, -error, other.grid.pixel)
+            taken[near] |= other.grid.lookup(core, at[:2, near].T, False)
+    return taken
 
 
 def _evidence(
@@ -160,10 +173,12 @@ def _evidence(
     kinds = [classes_on_grid(board.sheet, board.idx, v, board.grid, occluders, error) for v in board.views]
     cores = [seeds.inside & held & (k < 2) for (_, held), k in zip(rectified, kinds, strict=True)]
     labs = even_out([image for image, _ in rectified], cores, [v.side for v in board.views])
+    seen = [held & (kind != OCCLUDED) for (_, held), kind in zip(rectified, kinds, strict=True)]
+    means = means_of_others(labs, seen, [v.side for v in board.views])
     evidences, total, count = [], 0, 1e-6
-    for view, lab, (_, held), kind, core in zip(board.views, labs, rectified, kinds, cores, strict=True):
+    for view, lab, mean, shown, kind, core in zip(board.views, labs, means, seen, kinds, cores, strict=True):
         band = grown(cut_face_band(board.mask, view, board.grid), error / 2, board.grid.pixel) & ~seeds.inside
-        said = gather(lab, held, kind, band, seeds, error, options, rng)
+        said = gather(lab, mean, shown, kind, band, seeds, error, options, rng)
         if said is not None:
             evidences.append(said)
             total = total + contrast(lab, core) * said.seen

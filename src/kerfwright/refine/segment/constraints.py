@@ -6,14 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import shapely
+from shapely.geometry import MultiPoint, Polygon
 
 from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.refine.segment.grid import Grid
 
-__all__ = ["Limit", "carve", "limits_of"]
+__all__ = ["Limit", "carve", "limits_of", "margins", "neighbours", "promises"]
 
 SLANT = 0.02  # sine of the tilt under which a cut face counts as square
 PARALLEL = 0.995
+TOUCHING = ("contact", "corner", "ground")  # origins of segments that the board reaches
+NEAR_RIM = 10.0  # mm of the outline's rim that a strip to a segment is built on
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +27,7 @@ class Limit:
     start: np.ndarray
     end: np.ndarray
     standard_error: float
+    touching: bool = True  # the board is known to reach it
     deep: float = np.inf  # the excluded strip ends here: another constraint has material beyond
 
     @property
@@ -62,7 +67,7 @@ def _shift(segment: ConstraintSegment, z: float) -> float:
 
 def _widest(segment: ConstraintSegment, others: Sequence[ConstraintSegment], thickness: float) -> Limit:
     """The segment where the material reaches furthest: two bevels on one stretch make a pointed end."""
-    limit = Limit(segment.start, segment.end, segment.standard_error)
+    limit = Limit(segment.start, segment.end, segment.standard_error, segment.origin in TOUCHING)
     if segment.normal is None or abs(segment.normal[2]) < SLANT:
         return limit
     partners = [o for o in others if o is not segment and _same_stretch(limit, o)]
@@ -115,6 +120,28 @@ def _depth(limit: Limit, others: Sequence[Limit]) -> float:
     return deep
 
 
+def promises(limits: Sequence[Limit], region: Polygon, reach: float) -> Polygon:
+    """What lies between the outline and the segments it must touch, if no further apart than `reach` mm."""
+    strips = [_strip(limit, region, reach) for limit in limits if limit.touching]
+    return shapely.union_all([s for s in strips if s is not None])
+
+
+def margins(limits: Sequence[Limit], width: float) -> Polygon:
+    """Strips of `width` mm just past the segments that the board is known to reach."""
+    strips = [(limit, width * limit.inward) for limit in limits if limit.touching]
+    return shapely.union_all([Polygon([m.start, m.end, m.end - out, m.start - out]) for m, out in strips])
+
+
+def _strip(limit: Limit, region: Polygon, reach: float) -> Polygon | None:
+    gap = region.distance(shapely.LineString([limit.start, limit.end]))
+    if not 0 < gap < reach:
+        return None
+    deep = (gap + NEAR_RIM) * limit.inward
+    band = Polygon([limit.start, limit.end, limit.end + deep, limit.start + deep])
+    rim = region.intersection(band)
+    return None if rim.is_empty else MultiPoint([limit.start, limit.end]).union(rim).convex_hull.intersection(band)
+
+
 def carve(limits: Sequence[Limit], grid: Grid) -> tuple[np.ndarray, np.ndarray]:
     """Excluded pixels, and (4, rows, cols) where a step right, down, down-right, down-left crosses a segment."""
     excluded, crossing = np.zeros(grid.shape, bool), np.zeros((4, *grid.shape), bool)
@@ -124,14 +151,14 @@ def carve(limits: Sequence[Limit], grid: Grid) -> tuple[np.ndarray, np.ndarray]:
         beside = (along >= 0) & (along <= length)
         excluded |= beside & (across < 0) & (across > -limit.deep)
         for k, (dy, dx) in enumerate(((0, 1), (1, 0), (1, 1), (1, -1))):
-            here, there = _pair(across >= 0, dy, dx)
-            near_here, near_there = _pair(beside, dy, dx)
-            view, _ = _pair(crossing[k], dy, dx)
+            here, there = neighbours(across >= 0, dy, dx)
+            near_here, near_there = neighbours(beside, dy, dx)
+            view, _ = neighbours(crossing[k], dy, dx)
             view |= (here != there) & near_here & near_there
     return excluded, crossing
 
 
-def _pair(values: np.ndarray, dy: int, dx: int) -> tuple[np.ndarray, np.ndarray]:
+def neighbours(values: np.ndarray, dy: int, dx: int) -> tuple[np.ndarray, np.ndarray]:
     """Views of each pixel and its neighbour at (dy, dx)."""
     rows, columns = values.shape
     left = slice(max(0, -dx), columns - max(0, dx))

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
 from kerfwright.identify.types import Sheet
@@ -118,25 +119,27 @@ def _cheapest_loop(cost: np.ndarray) -> np.ndarray:
     """Viterbi round a closed chain: run half a turn longer at both ends, keep the middle."""
     n = len(cost)
     turn = np.arange(-(n // 2), n + n // 2) % n
-    best, back = cost[turn[0]].copy(), np.zeros((len(turn), cost.shape[1]), int)
-    k = np.arange(cost.shape[1])
-    for i, row in enumerate(turn[1:], 1):
-        moves = np.stack([_moved(best, d) + BEND * abs(d) for d in (0, -1, 1, -2, 2)])
-        pick = moves.argmin(0)
-        back[i] = np.clip(k + np.array([0, -1, 1, -2, 2])[pick], 0, len(k) - 1)
-        best = moves[pick, k] + cost[row]
-    chain = np.empty(len(turn), int)
+    return _viterbi(np.ascontiguousarray(cost[turn]), BEND)[n // 2 : n // 2 + n]
+
+
+@numba.njit(cache=True)
+def _viterbi(cost, bend):
+    """(M,) column of each row on the cheapest path; neighbouring rows differ by at most two columns, `bend` a column."""
+    rows, columns = cost.shape
+    best, back = cost[0].copy(), np.zeros((rows, columns), np.int32)
+    for i in range(1, rows):
+        last = best.copy()
+        for k in range(columns):
+            least, source = last[k], k
+            for j in range(max(0, k - 2), min(columns, k + 3)):
+                if last[j] + bend * abs(j - k) < least:
+                    least, source = last[j] + bend * abs(j - k), j
+            best[k], back[i, k] = least + cost[i, k], source
+    chain = np.empty(rows, np.int64)
     chain[-1] = best.argmin()
-    for i in range(len(turn) - 1, 0, -1):
+    for i in range(rows - 1, 0, -1):
         chain[i - 1] = back[i, chain[i]]
-    return chain[n // 2 : n // 2 + n]
-
-
-def _moved(values: np.ndarray, by: int) -> np.ndarray:
-    """values[k + by], infinite beyond the ends."""
-    out = np.full(len(values), np.inf)
-    out[max(0, -by) : len(values) - max(0, by)] = values[max(0, by) : len(values) + min(0, by)]
-    return out
+    return chain
 
 
 def view_offsets(scan: EdgeScan, path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfwright.identify.types import Sheet
-from kerfwright.refine.segment.appearance import Mixture, fit_mixture
+from kerfwright.refine.segment.appearance import Mixture, fit_mixture, same_surface
 from kerfwright.refine.segment.grid import Grid
 from kerfwright.refine.segment.options import SegmentOptions
 from kerfwright.refine.segment.scene import BOARD, CLEAR, OCCLUDED, Occluders
 from kerfwright.refine.segment.views import BoardView
 
-__all__ = ["Seeds", "ViewEvidence", "classes_on_grid", "cut_face_band", "gather", "grown", "seeds_of", "signed_distance"]
+__all__ = ["Seeds", "ViewEvidence", "classes_on_grid", "cut_face_band", "average", "gather", "grown", "means_of_others", "seeds_of", "signed_distance"]
 
 STRIDE = 3  # rays are cast for every third pixel: outlines of occluders are no better than that
 OCCLUDER_ERROR = 0.5  # share of the outline error by which occluders are grown
@@ -54,9 +54,14 @@ def grown(mask: np.ndarray, by: float, pixel: float) -> np.ndarray:
     return signed_distance(mask, pixel) > -by if mask.any() else mask
 
 
-def seeds_of(mask: np.ndarray, forbidden: np.ndarray, error: float, margin: float, pixel: float) -> Seeds:
-    """Hard seeds: the eroded outline is inside, what is far out is outside, as is what constraints or other boards take."""
-    distance = signed_distance(mask, pixel)
+def seeds_of(
+    mask: np.ndarray, beyond: np.ndarray, forbidden: np.ndarray, error: float, margin: float, pixel: float
+) -> Seeds:
+    """Hard seeds: the eroded outline is inside, what is far out is outside, as is what constraints or other boards take.
+
+    `beyond` counts as inside for the erosion: the outline stops there for certain.
+    """
+    distance = signed_distance(mask | beyond, pixel)
     depth = min(error, 0.5 * float(distance.max()))
     outside = (distance < -margin) & ~_hull(mask)
     outside[[0, -1]], outside[:, [0, -1]] = True, True
@@ -104,11 +109,13 @@ def cut_face_band(mask: np.ndarray, board_view: BoardView, grid: Grid) -> np.nda
 
 
 def gather(
-    lab: np.ndarray, held: np.ndarray, kinds: np.ndarray, band: np.ndarray, seeds: Seeds, error: float,
-    options: SegmentOptions, rng: np.random.Generator,
+    lab: np.ndarray, others: np.ndarray, seen: np.ndarray, kinds: np.ndarray, band: np.ndarray, seeds: Seeds,
+    error: float, options: SegmentOptions, rng: np.random.Generator,
 ) -> ViewEvidence | None:
-    """One view's evidence; None when it shows too little of the inside to learn its colours."""
-    seen = held & (kinds != OCCLUDED)
+    """One view's evidence; None when it shows too little of the inside to learn its colours.
+
+    `others` (rows, cols, 3) is the mean of the other views of the same side, NaN where there is none.
+    """
     beyond = seen & (seeds.distance < -error) & ~band
     inside = _learn(lab[seen & seeds.inside], options, rng)
     outside = {kind: _learn(lab[beyond & (kinds == kind)], options, rng) for kind in (CLEAR, BOARD)}
@@ -119,7 +126,7 @@ def gather(
     for kind, other in ((CLEAR, BOARD), (BOARD, CLEAR)):
         model = outside[kind] or outside[other]
         pixels = ask & (kinds == kind)
-        nats[pixels] = _log_ratio(inside, model, lab[pixels], options.evidence_cap)
+        nats[pixels] = _log_ratio(inside, model, lab[pixels], options.evidence_cap, others[pixels])
         weight[pixels] = 1.0 if kind == CLEAR else options.wood_share
     # where the board's own cut face would show, wood says nothing; anything else still says outside
     weight[band & (nats > 0)] = 0
@@ -131,10 +138,27 @@ def _learn(colours: np.ndarray, options: SegmentOptions, rng: np.random.Generato
     return fit_mixture(colours, options.components, options.samples, rng)
 
 
-def _log_ratio(inside: Mixture, outside: Mixture | None, colours: np.ndarray, cap: float) -> np.ndarray:
+def _log_ratio(
+    inside: Mixture, outside: Mixture | None, colours: np.ndarray, cap: float, others: np.ndarray | None = None
+) -> np.ndarray:
     if outside is None:
         return np.zeros(len(colours), np.float32)
-    return np.clip(inside.log_density(colours) - outside.log_density(colours), -cap, cap)
+    within = inside.log_density(colours)
+    if others is not None:
+        within = np.logaddexp(within, same_surface(colours, others))
+    return np.clip(within - outside.log_density(colours), -cap, cap)
+
+
+def means_of_others(labs: Sequence[np.ndarray], seen: Sequence[np.ndarray], sides: Sequence[int]) -> list[np.ndarray]:
+    """For each view the mean of the other views of its side, (rows, cols, 3), NaN where no other sees the pixel."""
+    out = []
+    totals = {s: (sum(lab * m[..., None] for lab, m, t in zip(labs, seen, sides, strict=True) if t == s),
+                  sum(m.astype(np.float32) for m, t in zip(seen, sides, strict=True) if t == s)) for s in set(sides)}
+    for lab, mask, side in zip(labs, seen, sides, strict=True):
+        total, count = totals[side]
+        rest = (count - mask)[..., None]
+        out.append(np.where(rest > 0, (total - lab * mask[..., None]) / np.maximum(rest, 1), np.nan))
+    return out
 
 
 def _trust(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kerfwright.refine.segment.constraints import _pair
+from kerfwright.refine.segment.constraints import neighbours
 
 __all__ = ["STEPS", "contrast", "cut", "smoothness_weights"]
 
@@ -17,14 +17,11 @@ STEEPEST = 8.0  # one view's contrast says no more than this: a glint must not o
 
 def contrast(lab: np.ndarray, inside: np.ndarray) -> np.ndarray:
     """(4, rows, cols) squared colour steps to each neighbour over those usual inside the board."""
-    steps = []
-    for dy, dx in STEPS:
-        here, there = _pair(np.arange(lab.shape[0] * lab.shape[1]).reshape(lab.shape[:2]), dy, dx)
-        flat = lab.reshape(-1, 3)
-        full = np.zeros(lab.shape[:2], np.float32)
-        _pair(full, dy, dx)[0][...] = ((flat[here] - flat[there]) ** 2).sum(-1)
-        steps.append(full)
-    stacked = np.stack(steps)
+    stacked = np.zeros((len(STEPS), *lab.shape[:2]), np.float32)
+    for full, (dy, dx) in zip(stacked, STEPS, strict=True):
+        for channel in np.moveaxis(lab, 2, 0):
+            here, there = neighbours(channel, dy, dx)
+            neighbours(full, dy, dx)[0][...] += (here - there) ** 2
     usual = stacked[:, inside].mean() if inside.any() else stacked.mean()
     return np.minimum(stacked / (4 * max(float(usual), 1.0)), STEEPEST)
 

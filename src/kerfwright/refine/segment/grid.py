@@ -27,6 +27,14 @@ class Grid:
         y = self.origin[1] + (np.arange(rows) + 0.5) * self.pixel
         return np.stack(np.meshgrid(x, y), axis=-1)
 
+    def affine(self, rows: np.ndarray) -> np.ndarray:
+        """(k, rows, columns) float32 values of k affine functions a x + b y + c, given as (k, 3): quicker than a product."""
+        height, width = self.shape
+        x = self.origin[0] + (np.arange(width) + 0.5) * self.pixel
+        y = self.origin[1] + (np.arange(height) + 0.5) * self.pixel
+        a, b, c = (column[:, None, None] for column in rows.T)
+        return ((b * y[:, None] + c).astype(np.float32) + (a * x).astype(np.float32)).astype(np.float32)
+
     def to_index(self, xy: np.ndarray) -> np.ndarray:
         """(..., 2) mm to (column, row), whole numbers at pixel centres."""
         return (xy - self.origin) / self.pixel - 0.5

@@ -17,13 +17,14 @@ class SegmentOptions:
     use_images: bool = True  # false: every board keeps the cloud's outline
     rounds: int = 2  # the second learns its colours from the first one's mask
     pixel: float | None = None  # of the rectified images; None: what the photographs support
-    min_pixel: float = 0.4  # finer than this costs time and adds nothing that the sub-pixel boundary doesn't see
+    min_pixel: float = 0.8  # finer is for the exact boundary, which is read from the photographs themselves
     max_pixel: float = 1.0
     max_grid: int = 700_000  # pixels of a rectified image; larger boards get coarser pixels
     min_visible: float = 0.3  # share of a board's rough region that a view must show to be of use
     min_slant: float = 0.2  # cosine between line of sight and sheet normal below which a view is too grazing
     outline_error: float = 8.0  # a rough outline is taken to be true to this: what is further in or out is known
     search_margin: float = 24.0  # how far beyond the rough outline the board may reach
+    contact_reach: float = 60.0  # a board known to touch another may be missing up to there: it is dark in corners
     refined_error: float = 4.0  # the same, of a mask after the first round
     components: int = 5  # of a colour mixture
     samples: int = 2500  # pixels that a colour mixture is trained on

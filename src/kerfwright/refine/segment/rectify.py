@@ -65,10 +65,23 @@ def rectify(
     photos: Photos, sheet: Sheet, board_view: BoardView, grid: Grid, shift: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """A photograph on the raster of its near sheet plane: (rows, cols, 3) uint8 RGB and a mask of what it holds."""
-    centres = grid.centres().reshape(-1, 2)
-    pixels = pixels_at(sheet, board_view.view, centres, board_view.near, shift).reshape(*grid.shape, 2)
+    pixels = _plane_pixels(sheet, board_view, grid, shift)
     shrink = max(1, int(board_view.density * grid.pixel / FINE))
     return sample(photos, board_view.view, pixels, shrink)
+
+
+def _plane_pixels(sheet: Sheet, board_view: BoardView, grid: Grid, shift: np.ndarray) -> np.ndarray:
+    """(rows, cols, 2) photo pixels of the raster's pixels on the near sheet plane."""
+    camera = board_view.view.camera
+    camera_from_board = board_view.view.camera_from_world @ sheet.world_from_board
+    turn, move = camera_from_board[:3, :3], camera_from_board[:3, 3]
+    constant = turn @ [*shift, board_view.near] + move
+    x, y, z = grid.affine(np.column_stack([turn[:, :2], constant]))
+    xy = np.stack([x, y], -1) / np.where(z > 0, z, np.nan)[..., None]
+    if camera.distortion.any():
+        xy = camera.distort(xy.reshape(-1, 2)).reshape(xy.shape)
+    focal, middle = np.diag(camera.matrix)[:2], camera.matrix[:2, 2]
+    return xy * focal.astype(np.float32) + middle.astype(np.float32)
 
 
 def even_out(images: Sequence[np.ndarray], masks: Sequence[np.ndarray], sides: Sequence[int]) -> list[np.ndarray]:
