@@ -16,6 +16,7 @@ from kerfwright.refine.curves.options import CurveFit, CurveOptions, EdgeStatist
 from kerfwright.refine.curves.path import check_path, full_circle, loop_of_shape
 from kerfwright.refine.curves.ranges import fit_circle
 from kerfwright.refine.curves.samples import Samples, resample
+from kerfwright.refine.curves.search import improve
 from kerfwright.refine.curves.snap import GuideLine, Run, find_runs, guide_lines
 from kerfwright.refine.curves.solve import Fit, solve
 from kerfwright.refine.curves.start import first_shape
@@ -84,7 +85,7 @@ def _fit_loop(loop: BoundaryLoop, guides: list[GuideLine], options: CurveOptions
     if not runs and chi2 + 3 * price < chain.cost:
         return _LoopFit(samples, None, (centre, radius, chi2))
     shape = first_shape(chain, samples, guides, options)
-    return _LoopFit(samples, solve(shape, samples, guides), None)
+    return _LoopFit(samples, improve(solve(shape, samples, guides), samples, guides, options), None)
 
 
 def _chain(samples: Samples, runs: list[Run], guides: list[GuideLine], options: CurveOptions) -> Chain:

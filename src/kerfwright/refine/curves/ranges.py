@@ -13,13 +13,13 @@ import numpy as np
 
 from kerfwright.refine.curves.samples import Samples
 
-__all__ = ["ARC", "CHOICE", "CUBIC", "LINE", "RangeFits", "fit_circle", "fit_ranges"]
+__all__ = ["ARC", "CHOICE", "CUBIC", "LINE", "RangeFits", "fit_circle", "fit_range", "fit_ranges"]
 
 LINE, ARC, CUBIC = 0, 1, 2
 FREEDOM = np.array([2.0, 3.0, 6.0])  # of a line, an arc, a cubic between two sharp nodes
 # What an edge costs besides, in the same unit: its node could be anywhere, and a line is the likeliest cut. With this a
 # square end beats a semicircle that fits as well, and one cubic two arcs.
-CHOICE = np.array([1.0, 2.5, 2.0])
+CHOICE = np.array([1.0, 2.5, 3.5])
 _OFFSET_GAIN = np.array([4.0, 9.0, 16.0])  # variance of a fitted polynomial at its end: (degree + 1)^2 / n
 _ANGLE_GAIN = np.array([12.0, 192.0, 1200.0])  # variance of its slope there, times length^2 / n
 _BATCH = 40
@@ -142,6 +142,19 @@ def fit_circle(samples: Samples) -> tuple[np.ndarray, float, float]:
     return centre, radius, float(w[0] * mse[0])
 
 
+def fit_range(samples: Samples, first: int, last: int, kind: int) -> float:
+    """Chi-square of the best free edge of a kind over samples first .. last (which may exceed N)."""
+    at = np.array([first % samples.count]), np.array([first % samples.count + last - first])
+    if kind == CUBIC:
+        return float(_cubics(samples, *at)[0][0])
+    sums = samples.moments[at[1] + 1 - (last - first >= samples.count)] - samples.moments[at[0]]
+    corner = samples.points[np.column_stack(at) % samples.count]
+    if kind == LINE:
+        return float(_lines(sums, corner)[0][0])
+    middle = samples.points[((at[0] + at[1]) // 2) % samples.count]
+    return float(_arcs(sums, corner, middle)[0][0])
+
+
 def _arcs(sums: np.ndarray, corner: np.ndarray, middle: np.ndarray) -> tuple[np.ndarray, ...]:
     w, mean, *moments = _central(sums)
     shift, r2, mse = _taubin(*moments)
@@ -164,21 +177,59 @@ def _arcs(sums: np.ndarray, corner: np.ndarray, middle: np.ndarray) -> tuple[np.
 
 
 def _cubics(samples: Samples, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Free cubics by batch least squares, parameters improved by four Newton steps."""
+    """Free cubics by batch least squares: by points with moving parameters, then, where that pays, by normal
+    distances.
+    """
     at = first[:, None] + np.rint(np.linspace(0, 1, _BATCH) * (last - first)[:, None]).astype(int)
     points, weight = samples.points[at % samples.count], samples.weight[at % samples.count]
     weight = weight * ((last - first + 1) / _BATCH)[:, None]
     t = np.repeat(np.linspace(0, 1, _BATCH)[None], len(first), axis=0)
-    for _ in range(4):
+    for _ in range(3):
         control = _solve_cubics(points, weight, t)
         t = _closer(control, points, t)
     control = _solve_cubics(points, weight, t)
-    gap = points - np.einsum("pmk,pkd->pmd", _basis(t), control)
-    chi2 = (weight * (gap**2).sum(axis=2)).sum(axis=1)
+    chi2 = _normal_chi2(control, points, weight, t)
+    near = np.flatnonzero(chi2 < 20 + 10 * (last - first) * samples.spacing / (2 * samples.correlation))
+    for _ in range(4):
+        t[near] = _closer(control[near], points[near], t[near])
+        control[near] = _tangent_step(control[near], points[near], weight[near], t[near])
+    chi2[near] = _normal_chi2(control[near], points[near], weight[near], t[near])
     ends = control[:, [0, 3]]
     tangents = control[:, [1, 3]] - control[:, [0, 2]]
     tangents /= np.maximum(np.linalg.norm(tangents, axis=2, keepdims=True), 1e-12)
     return chi2, ends, tangents, _end_curvature(control)
+
+
+def _velocity(control: np.ndarray, t: np.ndarray) -> np.ndarray:
+    s, t, d = (1 - t)[..., None], t[..., None], np.diff(control, axis=1)[:, None]
+    return 3 * (s * s * d[:, :, 0] + 2 * s * t * d[:, :, 1] + t * t * d[:, :, 2])
+
+
+def _left(vectors: np.ndarray) -> np.ndarray:
+    unit = vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
+    return np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
+
+
+def _normal_chi2(control: np.ndarray, points: np.ndarray, weight: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Chi-square of the distances across the curve; those along it are only a matter of parameters."""
+    gap = points - _basis(t) @ control
+    across = (gap * _left(_velocity(control, t))).sum(axis=2)
+    return (weight * across**2).sum(axis=1)
+
+
+def _tangent_step(control: np.ndarray, points: np.ndarray, weight: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """One Gauss-Newton step on distances across the curve, with a weak hold along it."""
+    basis, normal = _basis(t), _left(_velocity(control, t))
+    across = (basis[..., None] * normal[:, :, None, :]).reshape(*t.shape, 8)
+    gap = points - basis @ control
+    weighted = across * weight[..., None]
+    matrix = weighted.transpose(0, 2, 1) @ across
+    right = (weighted.transpose(0, 2, 1) @ (gap * normal).sum(axis=2)[..., None])[..., 0]
+    held = (basis * weight[..., None]).transpose(0, 2, 1) @ basis
+    for d in range(2):
+        matrix[:, d::2, d::2] += 1e-3 * held
+    matrix += 1e-9 * np.trace(matrix, axis1=1, axis2=2)[:, None, None] * np.eye(8)
+    return control + np.linalg.solve(matrix, right[..., None])[..., 0].reshape(-1, 4, 2)
 
 
 def _basis(t: np.ndarray) -> np.ndarray:
@@ -188,18 +239,16 @@ def _basis(t: np.ndarray) -> np.ndarray:
 
 def _solve_cubics(points: np.ndarray, weight: np.ndarray, t: np.ndarray) -> np.ndarray:
     basis = _basis(t)
-    weighted = basis * weight[..., None]
-    normal = np.einsum("pmk,pml->pkl", weighted, basis)
+    weighted = (basis * weight[..., None]).transpose(0, 2, 1)
+    normal = weighted @ basis
     normal += 1e-9 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(4)
-    return np.linalg.solve(normal, np.einsum("pmk,pmd->pkd", weighted, points))
+    return np.linalg.solve(normal, weighted @ points)
 
 
 def _closer(control: np.ndarray, points: np.ndarray, t: np.ndarray) -> np.ndarray:
     """One Gauss-Newton step of each parameter towards the foot of its point, then stretched to 0 .. 1."""
-    s = (1 - t)[..., None]
-    d = np.diff(control, axis=1)[:, None]
-    velocity = 3 * (s * s * d[:, :, 0] + 2 * s * t[..., None] * d[:, :, 1] + t[..., None] ** 2 * d[:, :, 2])
-    gap = points - np.einsum("pmk,pkd->pmd", _basis(t), control)
+    velocity = _velocity(control, t)
+    gap = points - _basis(t) @ control
     t = t + (gap * velocity).sum(axis=2) / np.maximum((velocity**2).sum(axis=2), 1e-9)
     t = np.maximum.accumulate(t, axis=1)
     low, high = t[:, :1], t[:, -1:]

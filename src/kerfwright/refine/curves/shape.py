@@ -14,7 +14,7 @@ import numpy as np
 from kerfwright.refine.curves.ranges import ARC, CUBIC
 from kerfwright.refine.curves.snap import GuideLine
 
-__all__ = ["Shape", "equations", "feet", "residuals"]
+__all__ = ["Shape", "end_turn", "equations", "feet", "residuals"]
 
 EXTRA = {ARC: 1, CUBIC: 4}
 _RIGHT = np.array([[0.0, 1.0], [-1.0, 0.0]])  # turns a vector to its right: where a counter-clockwise arc bows to
@@ -219,6 +219,12 @@ def _end_directions(shape: Shape, k: int) -> list[tuple[np.ndarray, np.ndarray]]
         )
         found.append((turn @ (b - a), np.hstack([-turn, turn, (slope @ (b - a))[:, None]])))
     return found
+
+
+def end_turn(shape: Shape, k: int) -> float:
+    """Signed angle, radians, that the path turns by at node k."""
+    u, v = _end_directions(shape, (k - 1) % shape.count)[1][0], _end_directions(shape, k)[0][0]
+    return float(np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v))
 
 
 def equations(shape: Shape, guides: list[GuideLine]) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from kerfwright.refine.curves.samples import Samples
 from kerfwright.refine.curves.shape import Shape
 from kerfwright.refine.curves.snap import GuideLine
 
-__all__ = ["chain_ranges", "first_shape"]
+__all__ = ["chain_ranges", "first_shape", "inner_unknowns"]
 
 
 def chain_ranges(nodes: tuple[int, ...], count: int) -> tuple[tuple[int, int], ...]:
@@ -31,7 +31,7 @@ def first_shape(chain: Chain, samples: Samples, guides: list[GuideLine], options
     nodes = [_node(samples.points[a], straight[k - 1], straight[k], options) for k, (a, _) in enumerate(ranges)]
     extras = []
     for k, (kind, span) in enumerate(zip(kinds, ranges, strict=True)):
-        extras.extend(_inner(kind, nodes[k], nodes[(k + 1) % len(nodes)], samples, span))
+        extras.extend(inner_unknowns(kind, nodes[k], nodes[(k + 1) % len(nodes)], samples, span))
     return Shape(np.concatenate([*nodes, np.array(extras)]), kinds, chain.lines, chain.smooth, ranges)
 
 
@@ -59,7 +59,7 @@ def _node(
     return point if line is None else point - (line[0] @ point - line[1]) * line[0]
 
 
-def _inner(kind: int, a: np.ndarray, b: np.ndarray, samples: Samples, span: tuple[int, int]) -> list[float]:
+def inner_unknowns(kind: int, a: np.ndarray, b: np.ndarray, samples: Samples, span: tuple[int, int]) -> list[float]:
     """Bulge of an arc or inner control points of a cubic between two nodes."""
     points = samples.points[np.arange(span[0], span[1] + 1) % samples.count]
     if kind == ARC:

@@ -1,0 +1,168 @@
+"""Change the structure of a fitted chain where that pays: smooth a node, merge edges, change an edge's kind.
+
+Dynamic programming prices nodes from free fits of ranges that end at candidate points. Once all unknowns are fitted
+together the same price can be put on the real thing, and small changes of structure are tried, the most promising
+first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfwright.refine.curves.chain import unit_price
+from kerfwright.refine.curves.options import CurveOptions
+from kerfwright.refine.curves.ranges import ARC, CHOICE, CUBIC, LINE, fit_range
+from kerfwright.refine.curves.samples import Samples
+from kerfwright.refine.curves.shape import Shape, end_turn
+from kerfwright.refine.curves.snap import GuideLine
+from kerfwright.refine.curves.solve import Fit, solve
+from kerfwright.refine.curves.start import inner_unknowns
+
+__all__ = ["improve", "score"]
+
+MOST_TRIALS = 40
+MOST_TURN = 0.7  # radians: a sharp node that turns more is not tried smooth
+
+
+@dataclass(frozen=True)
+class _Move:
+    """Edges first .. first + count - 1 (round the loop) become one edge of a kind, or node `first` changes
+    smoothness.
+    """
+
+    first: int
+    count: int
+    kind: int
+    gain: float  # estimated
+    smooth: tuple[bool, bool] | None = None  # of both ends, where the move sets them
+
+
+def score(fit: Fit, samples: Samples, options: CurveOptions) -> float:
+    """Chi-square and the price of the structure: what is minimised."""
+    kinds = np.array(fit.shape.kinds)
+    return fit.chi2 + unit_price(samples, options) * (fit.shape.freedom + float(CHOICE[kinds].sum()))
+
+
+def improve(fit: Fit, samples: Samples, guides: list[GuideLine], options: CurveOptions) -> Fit:
+    """Take moves that lower the score until none does."""
+    best, trials, tried = score(fit, samples, options), 0, set()
+    while trials < MOST_TRIALS:
+        for move in _moves(fit, samples, options):
+            key = _key(fit.shape, move)
+            if key in tried or trials >= MOST_TRIALS:
+                continue
+            tried.add(key)
+            trials += 1
+            trial = solve(_applied(fit.shape, move, samples), samples, guides, steps=12)
+            if score(trial, samples, options) < best - 1e-6:
+                fit = settled(trial, samples, guides)
+                best = score(fit, samples, options)
+                break
+        else:
+            return fit
+    return fit
+
+
+def settled(fit: Fit, samples: Samples, guides: list[GuideLine]) -> Fit:
+    """Fit again with the ranges of the edges moved to where the nodes have gone."""
+    return solve(_with_ranges(fit.shape, samples), samples, guides)
+
+
+def _with_ranges(shape: Shape, samples: Samples) -> Shape:
+    starts = []
+    reach = samples.steps(25.0)
+    for k, (first, _) in enumerate(shape.ranges):
+        window = np.arange(first - reach, first + reach + 1)
+        gap = np.linalg.norm(samples.points[window % samples.count] - shape.node(k), axis=1)
+        starts.append(int(window[gap.argmin()]))
+    ranges = []
+    for k, start in enumerate(starts):
+        stop = starts[(k + 1) % len(starts)]
+        while stop <= start:
+            stop += samples.count
+        ranges.append((start % samples.count, start % samples.count + stop - start))
+    turns = sum(stop - start for start, stop in ranges)
+    return (
+        Shape(shape.unknowns, shape.kinds, shape.lines, shape.smooth, tuple(ranges))
+        if turns == samples.count
+        else shape
+    )
+
+
+def _key(shape: Shape, move: _Move) -> tuple:
+    nodes = tuple(round(shape.ranges[(move.first + i) % shape.count][0] / 8) for i in range(move.count + 1))
+    return (nodes, move.kind, move.smooth, shape.count)
+
+
+def _moves(fit: Fit, samples: Samples, options: CurveOptions) -> list[_Move]:
+    found = [*_smoothings(fit, samples, options), *_merges(fit, samples, options)]
+    return sorted((m for m in found if m.gain > 0), key=lambda m: (-m.gain, m.first, m.count, m.kind))
+
+
+def _smoothings(fit: Fit, samples: Samples, options: CurveOptions) -> Iterator[_Move]:
+    """Sharp nodes that turn little, one of whose edges is curved."""
+    shape, price = fit.shape, unit_price(samples, options)
+    for k in range(shape.count):
+        curved = shape.kinds[k] != LINE or shape.kinds[k - 1] != LINE
+        turn = end_turn(shape, k)
+        if not shape.smooth[k] and curved and abs(turn) < MOST_TURN:
+            yield _Move(k, 0, -1, price * (1.0 - abs(turn)))
+
+
+def _merges(fit: Fit, samples: Samples, options: CurveOptions) -> Iterator[_Move]:
+    """One, two or three edges as one of any kind, where a free fit of their range promises a lower score."""
+    shape, price = fit.shape, unit_price(samples, options)
+    now = np.bincount(fit.edge, samples.weight * fit.distance**2, minlength=shape.count)
+    for count in (1, 2, 3):
+        if shape.count - count < 1:
+            continue
+        for first in range(shape.count):
+            edges = [(first + i) % shape.count for i in range(count)]
+            if any(shape.lines[k] >= 0 for k in edges):
+                continue
+            span = _span(shape, first, count, samples.count)
+            paid = sum(now[k] + price * _charge(shape.kinds[k]) for k in edges)
+            paid -= price * sum(shape.smooth[k] for k in edges[1:])
+            for kind in (LINE, ARC, CUBIC):
+                if count == 1 and kind == shape.kinds[first]:
+                    continue
+                gain = (
+                    paid - fit_range(samples, *span, kind) - price * _charge(kind) + (2 * price if count > 1 else price)
+                )
+                yield _Move(first, count, kind, gain)
+
+
+def _charge(kind: int) -> float:
+    return (2.0, 3.0, 6.0)[kind] + float(CHOICE[kind])
+
+
+def _span(shape: Shape, first: int, count: int, total: int) -> tuple[int, int]:
+    start = shape.ranges[first][0]
+    length = sum(b - a for a, b in (shape.ranges[(first + i) % shape.count] for i in range(count)))
+    return start, start + length
+
+
+def _applied(shape: Shape, move: _Move, samples: Samples) -> Shape:
+    """The structure after a move, its unknowns near their best."""
+    if move.count == 0:
+        smooth = tuple(s or k == move.first for k, s in enumerate(shape.smooth))
+        return Shape(shape.unknowns, shape.kinds, shape.lines, smooth, shape.ranges)
+    n = shape.count
+    order = [(move.first + i) % n for i in range(n)]
+    kept = order[move.count :]
+    starts = [move.first, *kept]
+    kinds = (move.kind, *(shape.kinds[k] for k in kept))
+    lines = (-1, *(shape.lines[k] for k in kept))
+    ranges = (_span(shape, move.first, move.count, samples.count), *(shape.ranges[k] for k in kept))
+    smooth = tuple(shape.smooth[k] and not _both_lines(kinds, i) for i, k in enumerate(starts))
+    nodes = [shape.node(k) for k in starts]
+    inner = [inner_unknowns(move.kind, nodes[0], nodes[1 % len(nodes)], samples, ranges[0])]
+    inner += [shape.unknowns[shape.extra(k)].tolist() for k in kept]
+    return Shape(np.concatenate([*nodes, *map(np.array, inner)]), kinds, lines, smooth, ranges)
+
+
+def _both_lines(kinds: tuple[int, ...], i: int) -> bool:
+    return kinds[i] == LINE and kinds[i - 1] == LINE
