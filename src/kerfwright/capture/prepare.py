@@ -1,28 +1,108 @@
-"""Move a capture to where every later stage works: millimetres, +z up, floor at z = 0, the object about the origin."""
+"""Move a capture to where every later stage works: millimetres, +z up, floor at z = 0, the object about the origin.
+
+Every length here is a fraction of the cloud's size or a multiple of its noise: the scale may be assumed.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kerfwright.capture.frame import moved, similarity
+from kerfwright.capture.crop import Cropped, above_floor, crop_to_object, focus
+from kerfwright.capture.floor import Floor, find_floor
+from kerfwright.capture.frame import moved, rotation_between, similarity
 from kerfwright.capture.types import Capture
+from kerfwright.capture.yaw import upright_turn
+from kerfwright.errors import CaptureError
 
 __all__ = ["PrepareOptions", "prepare"]
+
+Z = np.array([0.0, 0.0, 1.0])
+FEWEST_POINTS = 100  # as for a cloud as read
 
 
 @dataclass(frozen=True)
 class PrepareOptions:
-    """What a user may choose."""
+    """What a user may choose.
+
+    Attributes
+    ----------
+    crop : leave out the floor, other objects and strays.
+    ground : height of the floor in capture units along the up axis, instead of looking for it; nothing is levelled then.
+    seed : of the search for the floor.
+    """
 
     crop: bool = True
+    ground: float | None = None
+    seed: int = 0
 
 
 def prepare(capture: Capture, options: PrepareOptions | None = None) -> Capture:
-    """Scale, level, crop, centre and turn a capture."""
-    points = capture.cloud.points
-    low, high = np.percentile(points, (0.1, 99.9), axis=0)
-    origin = np.array([*(low + high)[:2] / 2, low[2]])
+    """Level, crop, turn, centre and scale a capture; turned, moved or scaled input gives the same.
+
+    The horizontal direction that most upright faces look along becomes x or y, the longer side lies along x; z = 0 is the floor,
+    or the lowest of the object where the cloud has no floor.
+
+    Returns
+    -------
+    The capture in millimetres; its `capture_from_world` leads back, its notes say what was done.
+
+    Raises
+    ------
+    CaptureError
+        If too few points are left.
+    """
+    options = options or PrepareOptions()
+    capture, floor = _levelled(capture, options)
+    if options.crop:
+        capture = _cropped(capture, floor)
+    ground = floor.offset if floor else robust_lowest(capture.cloud.points[:, 2])
+    capture = moved(capture, similarity(1.0, upright_turn(capture.cloud), np.zeros(3)))
+    low, high = np.percentile(capture.cloud.points[:, :2], (0.1, 99.9), axis=0)
     scale = capture.scale.millimetres_per_unit
-    return moved(capture, similarity(scale, np.eye(3), -scale * origin))
+    return moved(capture, similarity(scale, np.eye(3), -scale * np.array([*(low + high) / 2, ground])))
+
+
+def _levelled(capture: Capture, options: PrepareOptions) -> tuple[Capture, Floor | None]:
+    """The capture with its floor level, and that floor."""
+    if options.ground is not None:
+        return capture, Floor(Z, options.ground, 0.0)
+    centres = np.array([view.centre for view in capture.views]).reshape(-1, 3)
+    floor = find_floor(capture.cloud, centres, np.random.default_rng(options.seed))
+    if floor is None:
+        return capture, None
+    tilt = np.degrees(np.arccos(np.clip(floor.normal @ Z, -1, 1)))
+    note = f"the floor was found; it was tilted by {tilt:.2f} degrees and is level now"
+    turned = moved(capture, similarity(1.0, rotation_between(floor.normal, Z), np.zeros(3)))
+    return replace(turned, notes=(*capture.notes, note)), Floor(Z, floor.offset, floor.noise)
+
+
+def _cropped(capture: Capture, floor: Floor | None) -> Capture:
+    cloud = capture.cloud
+    notes = capture.notes
+    if floor:
+        above = above_floor(cloud, floor)
+        notes = (*notes, f"{len(cloud) - int(above.sum())} points of the floor were left out")
+        cloud = cloud.select(above)
+    cropped: Cropped = crop_to_object(cloud.points, focus(capture.views))
+    cloud = cloud.select(cropped.keep)
+    if len(cloud) < FEWEST_POINTS:
+        raise CaptureError(f"{capture.name}: points above the floor: {len(cloud)}: at least {FEWEST_POINTS} are needed: "
+                           "check --up and --ground")
+    return replace(capture, cloud=cloud, notes=(*notes, *cropped.notes))
+
+
+def robust_lowest(heights: np.ndarray) -> float:
+    """Where an object stands: the height at which its points begin, strays apart.
+
+    Upright faces give points evenly over the height, blurred by noise at their end: the end is where the density first reaches half
+    of what it is a little higher.
+    """
+    low, high = np.percentile(heights, (0.05, 99.9))
+    near = heights[(heights >= low - 0.01 * (high - low)) & (heights < low + 0.05 * (high - low))]
+    edges = np.linspace(low - 0.01 * (high - low), low + 0.05 * (high - low), 121)
+    counts = np.histogram(near, edges)[0].astype(float)
+    if not counts.any():
+        return float(low)
+    return float(edges[int((counts >= 0.5 * np.median(counts[20:])).argmax())])
