@@ -98,7 +98,8 @@ def test_reconstruct_writes_and_tells(tmp_path):
     done = run(fake("reconstruct", tmp_path / "capture", "-o", tmp_path / "out"))
     assert done.returncode == 0, done.stderr
     assert str(tmp_path / "out") in done.stdout
-    assert [line.split()[0] for line in done.stderr.splitlines()] == ["Reading", "Finding", "Checking", "Writing"]
+    steps = [line.split()[:2] for line in done.stderr.splitlines()]
+    assert steps == [["1/4", "Reading"], ["2/4", "Finding"], ["3/4", "Checking"], ["4/4", "Writing"]]
     assert sorted(os.listdir(tmp_path / "out")) == [".cache", ".kerfwright.json", "model.json", "run.json"]
     record = json.loads((tmp_path / "out" / "run.json").read_text())
     assert list(record["seconds"]) == ["capture", "identify", "check", "write"]
@@ -161,7 +162,7 @@ def test_ctrl_c_ends_it_at_once_and_keeps_the_old_results(tmp_path, number, code
     began = time.monotonic()
     os.killpg(process.pid, number)
     _, errors = process.communicate(timeout=5)
-    assert time.monotonic() - began < 1 and process.returncode == code
+    assert time.monotonic() - began < 3 and process.returncode == code
     assert errors.startswith("kerfwright: interrupted") and errors.count("\n") == 1
     assert {p: p.read_bytes() for p in out.iterdir() if p.is_file()} == before
 

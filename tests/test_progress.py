@@ -50,6 +50,25 @@ def test_json_lines():
     assert events[4]["cached"] and not events[2]["cached"]
 
 
+def test_time_left_follows_from_the_usual_shares():
+    reporter = Reporter()
+    assert reporter.left() is None
+    reporter.plan({"a": 0.1, "b": 0.2, "c": 0.7})
+    reporter.seconds["a"] = 3.0
+    assert reporter.left() == pytest.approx(27)
+    reporter.seconds["b"] = 0.01
+    reporter.reuse("b")
+    assert reporter.left() == pytest.approx(21), "what came from the cache tells nothing of speed"
+
+
+def test_steps_are_counted_when_they_were_announced():
+    stream = io.StringIO()
+    reporter = PlainReporter(stream)
+    reporter.plan({"one": 1, "two": 1, "three": 1})
+    run(reporter)
+    assert [line.split()[0] for line in stream.getvalue().splitlines()] == ["1/3", "2/3"]
+
+
 def test_a_terminal_gets_its_cursor_back():
     stream = Terminal()
     run(RichReporter(stream, verbose=True))

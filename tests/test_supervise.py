@@ -34,7 +34,7 @@ def test_signals_end_it_at_once(number, whole_group):
     began = time.monotonic()
     (os.killpg if whole_group else os.kill)(process.pid, number)
     assert process.wait(5) == 128 + number
-    assert time.monotonic() - began < 1
+    assert time.monotonic() - began < 3
 
 
 def test_the_child_dies_with_its_parent():

@@ -44,12 +44,13 @@ class ReconstructOptions:
 
 @dataclass(frozen=True)
 class Stage:
-    """One step: `run(*results of needs, options)` gives its result."""
+    """One step: `run(*results of needs, options)` gives its result; `share` is its usual part of the time."""
 
     name: str
     text: str
     needs: tuple[str, ...]
     run: Callable[..., Any]
+    share: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +99,9 @@ def run_stages(
 ) -> dict[str, Any]:
     """Run the stages in order; returns every stage's result by name. "path" is the capture's folder."""
     results: dict[str, Any] = {"path": path}
-    for stage in STAGES if stages is None else stages:
+    stages = STAGES if stages is None else stages
+    reporter.plan({stage.name: stage.share for stage in stages} | AFTERWARDS)
+    for stage in stages:
         with reporter.stage(stage.name, stage.text):
             run = partial(stage.run, *(results[name] for name in stage.needs), options)
             results[stage.name], kept = cache.get(stage.name, stage.needs, run)
@@ -141,12 +144,13 @@ def _check(refined: Any, assembly: Assembly, parts: Parts, capture: Capture, opt
 
 
 STAGES: tuple[Stage, ...] = (
-    Stage("capture", "Reading the capture", ("path",), _capture),
-    Stage("identify", "Finding boards in the cloud", ("capture",), _identify),
-    Stage("assemble", "Finding how the boards meet", ("identify", "capture"), _assemble),
-    Stage("refine", "Tracing cut paths in the photographs", ("assemble", "identify", "capture"), _refine),
-    Stage("check", "Building solids and checking them", ("refine", "assemble", "identify", "capture"), _check),
+    Stage("capture", "Reading the capture", ("path",), _capture, 0.02),
+    Stage("identify", "Finding boards in the cloud", ("capture",), _identify, 0.3),
+    Stage("assemble", "Finding how the boards meet", ("identify", "capture"), _assemble, 0.1),
+    Stage("refine", "Tracing cut paths in the photographs", ("assemble", "identify", "capture"), _refine, 0.35),
+    Stage("check", "Building solids and checking them", ("refine", "assemble", "identify", "capture"), _check, 0.13),
 )
+AFTERWARDS = {"write": 0.1}  # writing is no stage, but takes its part of the time
 
 
 def _model(refined: Any, assembly: Assembly, parts: Parts, capture: Capture, options: ReconstructOptions) -> Model:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, TextIO
 
@@ -23,6 +23,20 @@ class Reporter:
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
         self.reused: list[str] = []
+        self._shares: dict[str, float] = {}
+
+    def plan(self, shares: Mapping[str, float]) -> None:
+        """Announce the stages to come, each with its usual share of the time."""
+        self._shares = dict(shares)
+
+    def left(self) -> float | None:
+        """Seconds for the stages not yet finished, if they take their usual shares; None while nothing tells."""
+        measured = [name for name in self.seconds if name in self._shares and name not in self.reused]
+        share = sum(self._shares[name] for name in measured)
+        if not share:
+            return None
+        ahead = sum(part for name, part in self._shares.items() if name not in self.seconds)
+        return sum(self.seconds[name] for name in measured) / share * ahead
 
     @contextmanager
     def stage(self, name: str, text: str = "") -> Iterator[None]:
@@ -53,6 +67,11 @@ class Reporter:
 
     def _failed(self, name: str) -> None: ...
 
+    def _step(self, name: str) -> str:
+        """Which of the announced stages this is."""
+        names = list(self._shares)
+        return f"{names.index(name) + 1}/{len(names)} " if name in names else ""
+
     def _remark(self, name: str) -> str:
         return " (from the cache)" if name in self.reused else ""
 
@@ -69,7 +88,7 @@ class PlainReporter(Reporter):
             self._say(f"    {message}")
 
     def _finished(self, name: str, text: str, seconds: float) -> None:
-        self._say(f"{text:<40} {seconds:6.1f} s{self._remark(name)}")
+        self._say(f"{self._step(name) + text:<42} {seconds:6.1f} s{self._remark(name)}")
 
     def _say(self, line: str) -> None:
         print(line, file=self._stream, flush=True)
@@ -86,7 +105,8 @@ class JsonReporter(Reporter):
         self._say(event="note", message=message)
 
     def _started(self, name: str, text: str) -> None:
-        self._say(event="started", stage=name)
+        left = self.left()
+        self._say(event="started", stage=name, left_seconds=None if left is None else round(left, 1))
 
     def _finished(self, name: str, text: str, seconds: float) -> None:
         self._say(event="finished", stage=name, seconds=round(seconds, 3), cached=name in self.reused)
@@ -121,15 +141,17 @@ class RichReporter(Reporter):
     def _started(self, name: str, text: str) -> None:
         from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-        columns = (SpinnerColumn(), TextColumn("{task.description:<38}"), TimeElapsedColumn())
+        left = self.left()
+        ahead = "" if left is None else f"about {left:.0f} s left"
+        columns = (SpinnerColumn(), TextColumn("{task.description:<42}"), TimeElapsedColumn(), TextColumn(ahead))
         # Standard output is for results: only what libraries say on standard error would break the line.
         self._live = Progress(*columns, console=self._console, transient=True, redirect_stdout=False)
-        self._live.add_task(text)
+        self._live.add_task(self._step(name) + text)
         self._live.start()
 
     def _finished(self, name: str, text: str, seconds: float) -> None:
         self.close()
-        self._console.print(f"[green]✓[/] {text:<38} {seconds:6.1f} s{self._remark(name)}")
+        self._console.print(f"[green]✓[/] {self._step(name) + text:<42} {seconds:6.1f} s{self._remark(name)}")
 
     def _failed(self, name: str) -> None:
         self.close()
