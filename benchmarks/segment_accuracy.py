@@ -184,6 +184,9 @@ def _runs(board, sheet, boards, a, b, length) -> list[ConstraintSegment]:
         p = other.to_board(world)
         hit = (p[:, 2] > 0.05) & (p[:, 2] < other.thickness - 0.05) & shapely.contains_xy(other.outline, p[:, :2])
         out += _segment(board, sheet, a, t, at[hit], "contact")
+        if abs(abs(p[:, 2] - other.thickness / 2) - other.thickness / 2 - 0.6).max() < 0.1:
+            beside = shapely.contains_xy(other.outline.buffer(board.thickness), p[:, :2])
+            out += _segment(board, sheet, a, t, at[beside], "corner")
     return out + _segment(board, sheet, a, t, at[world[:, 2] < 0], "ground")
 
 

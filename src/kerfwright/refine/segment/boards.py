@@ -7,14 +7,15 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
-from shapely.geometry import Polygon
+from shapely import union_all
+from shapely.geometry import LineString, Polygon
 
 from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.capture.types import Capture
 from kerfwright.errors import OptionError
 from kerfwright.identify.types import Sheet
 from kerfwright.refine.segment.boundary import Chain, chain_of, loops_of, registration, settle, snap
-from kerfwright.refine.segment.constraints import Limit, carve, limits_of, margins, promises
+from kerfwright.refine.segment.constraints import Limit, carve, fill_to_contacts, limits_of, margins
 from kerfwright.refine.segment.edges import EdgeScan, scan_edges
 from kerfwright.refine.segment.evidence import (
     ViewEvidence,
@@ -112,14 +113,18 @@ def _begin(
     densities = [v.density for v in views] or [1.0]
     pixel = options.pixel or float(np.clip(1 / np.median(densities), options.min_pixel, options.max_pixel))
     limits = limits_of(constraints, sheet.thickness.value, CORNER_REACH * sheet.thickness.value)
-    promised = promises(limits, sheet.region, options.contact_reach)
-    grid = grid_over(sheet.region.union(promised), options.search_margin + 4 * pixel, pixel, options.max_grid)
+    grid = grid_over(_ground_covered(sheet.region, limits, options.contact_reach), options.search_margin + 4 * pixel, pixel, options.max_grid)
     excluded, crossing = carve(limits, grid)
-    region = sheet.region.union(promised).buffer(0)
-    mask = grid.mask(region) & ~excluded
+    mask = fill_to_contacts(grid.mask(sheet.region) & ~excluded, limits, grid, options.contact_reach)
     shifts = [np.zeros(2) for _ in views]
     return _Board(idx, sheet, limits, grid, views, shifts, excluded, crossing, [mask], [sheet.region],
                   grid.mask(margins(limits, 2 * options.outline_error)))
+
+
+def _ground_covered(region: Polygon, limits: Sequence[Limit], reach: float) -> Polygon:
+    """The region and the segments near enough for the board to be run on to them."""
+    lines = [LineString([m.start, m.end]) for m in limits if m.touching]
+    return union_all([region, *(line for line in lines if line.distance(region) < reach)]).envelope
 
 
 def _round(

@@ -7,17 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
-from shapely.geometry import MultiPoint, Polygon
+from shapely.geometry import Polygon
 
 from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.refine.segment.grid import Grid
 
-__all__ = ["Limit", "carve", "limits_of", "margins", "neighbours", "promises"]
+__all__ = ["Limit", "carve", "fill_to_contacts", "limits_of", "margins", "neighbours"]
 
 SLANT = 0.02  # sine of the tilt under which a cut face counts as square
 PARALLEL = 0.995
 TOUCHING = ("contact", "corner", "ground")  # origins of segments that the board reaches
-NEAR_RIM = 10.0  # mm of the outline's rim that a strip to a segment is built on
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,26 +119,26 @@ def _depth(limit: Limit, others: Sequence[Limit]) -> float:
     return deep
 
 
-def promises(limits: Sequence[Limit], region: Polygon, reach: float) -> Polygon:
-    """What lies between the outline and the segments it must touch, if no further apart than `reach` mm."""
-    strips = [_strip(limit, region, reach) for limit in limits if limit.touching]
-    return shapely.union_all([s for s in strips if s is not None])
+def fill_to_contacts(mask: np.ndarray, limits: Sequence[Limit], grid: Grid, reach: float) -> np.ndarray:
+    """The mask, run on to the segments that the board is known to reach: straight inward from each, up to `reach` mm."""
+    filled = mask.copy()
+    for limit in (m for m in limits if m.touching):
+        _, _, length = limit.local(limit.start)
+        along = np.arange(0, length, grid.pixel / 2)
+        deep = np.arange(grid.pixel / 4, reach, grid.pixel / 2)
+        xy = limit.start + along[:, None, None] * limit.along + deep[None, :, None] * limit.inward
+        held = grid.lookup(mask, xy.reshape(-1, 2), False).reshape(xy.shape[:2])
+        first = np.where(held.any(1), held.argmax(1), 0)
+        row_column = np.floor((xy - grid.origin) / grid.pixel).astype(int)[np.arange(len(deep)) < first[:, None]]
+        inside = (row_column >= 0).all(1) & (row_column < grid.shape[::-1]).all(1)
+        filled[row_column[inside, 1], row_column[inside, 0]] = True
+    return filled
 
 
 def margins(limits: Sequence[Limit], width: float) -> Polygon:
     """Strips of `width` mm just past the segments that the board is known to reach."""
     strips = [(limit, width * limit.inward) for limit in limits if limit.touching]
     return shapely.union_all([Polygon([m.start, m.end, m.end - out, m.start - out]) for m, out in strips])
-
-
-def _strip(limit: Limit, region: Polygon, reach: float) -> Polygon | None:
-    gap = region.distance(shapely.LineString([limit.start, limit.end]))
-    if not 0 < gap < reach:
-        return None
-    deep = (gap + NEAR_RIM) * limit.inward
-    band = Polygon([limit.start, limit.end, limit.end + deep, limit.start + deep])
-    rim = region.intersection(band)
-    return None if rim.is_empty else MultiPoint([limit.start, limit.end]).union(rim).convex_hull.intersection(band)
 
 
 def carve(limits: Sequence[Limit], grid: Grid) -> tuple[np.ndarray, np.ndarray]:

@@ -61,11 +61,12 @@ def seeds_of(
 
     `beyond` counts as inside for the erosion: the outline stops there for certain.
     """
-    distance = signed_distance(mask | beyond, pixel)
+    distance = signed_distance(mask, pixel)
+    settled = signed_distance(mask | beyond, pixel)
     depth = min(error, 0.5 * float(distance.max()))
     outside = (distance < -margin) & ~_hull(mask)
     outside[[0, -1]], outside[:, [0, -1]] = True, True
-    return Seeds((distance > depth) & ~forbidden, outside | forbidden, distance)
+    return Seeds((settled > depth) & mask & ~forbidden, outside | forbidden, distance)
 
 
 def _hull(mask: np.ndarray) -> np.ndarray:
