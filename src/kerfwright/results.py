@@ -11,16 +11,18 @@ import platform
 import resource
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kerfwright import __version__
-from kerfwright.capture.types import Capture
 from kerfwright.model import Model
 from kerfwright.model.io import write_model
 from kerfwright.progress import Reporter
 from kerfwright.report.figures import figures
 from kerfwright.report.page import report_html
 from kerfwright.versions import library_versions
+
+if TYPE_CHECKING:
+    from kerfwright.capture.types import Capture
 
 __all__ = ["write_results", "write_run"]
 

@@ -11,13 +11,15 @@ from kerfwright.model.geometry import path_area
 from kerfwright.report.drawing import board_svg
 
 IDENTITY = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))
-OUTER = Loop(edges=(
-    Line(start=(0, 0), end=(200, 0)),
-    Arc(start=(200, 0), mid=(240, 40), end=(200, 80)),
-    Line(start=(200, 80), end=(60, 80)),
-    Bezier(start=(60, 80), control_1=(40, 80), control_2=(20, 60), end=(0, 80)),
-    Line(start=(0, 80), end=(0, 0)),
-))
+OUTER = Loop(
+    edges=(
+        Line(start=(0, 0), end=(200, 0)),
+        Arc(start=(200, 0), mid=(240, 40), end=(200, 80)),
+        Line(start=(200, 80), end=(60, 80)),
+        Bezier(start=(60, 80), control_1=(40, 80), control_2=(20, 60), end=(0, 80)),
+        Line(start=(0, 80), end=(0, 0)),
+    )
+)
 HOLE = Loop(edges=(Circle(centre=(100, 40), radius=12, clockwise=True),))
 
 
@@ -95,7 +97,10 @@ def test_nodes_are_sharp_or_smooth():
     root = tree(board())
     titles = [n.find("title").text for n in root.iter() if n.get("class") == "node"]
     assert titles == [
-        "200.0, 0.0 mm, smooth", "200.0, 80.0 mm, smooth", "60.0, 80.0 mm, smooth", "0.0, 80.0 mm, sharp",
+        "200.0, 0.0 mm, smooth",
+        "200.0, 80.0 mm, smooth",
+        "60.0, 80.0 mm, smooth",
+        "0.0, 80.0 mm, sharp",
         "0.0, 0.0 mm, sharp",
     ]
 

@@ -31,7 +31,15 @@ def board(name: str, thickness: float = 18.0, **more) -> Board:
 
 def contact(a: str, b: str, kind: int = 1) -> Contact:
     return Contact(
-        type=kind, a=a, b=b, face_a="top", face_b="edge", point=(0, 0, 0), normal=(0, 0, 1), interface=(), area=10.0,
+        type=kind,
+        a=a,
+        b=b,
+        face_a="top",
+        face_b="edge",
+        point=(0, 0, 0),
+        normal=(0, 0, 1),
+        interface=(),
+        area=10.0,
         angle=90.0,
     )
 

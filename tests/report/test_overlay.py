@@ -51,8 +51,10 @@ def test_outlines_run_along_the_projected_edges_and_nowhere_else(name):
     front = view(CAMERAS[name])
     lines = draw(MESHES[:1], front).lines
     drawn = np.argwhere(lines > 0.2)[:, ::-1] + 0.5
-    rim = [np.linspace(a, b, 400) for a, b in (((-90, -60), (-10, -60)), ((-10, -60), (-10, 60)),
-                                               ((-10, 60), (-90, 60)), ((-90, 60), (-90, -60)))]
+    rim = [
+        np.linspace(a, b, 400)
+        for a, b in (((-90, -60), (-10, -60)), ((-10, -60), (-10, 60)), ((-10, 60), (-90, 60)), ((-90, 60), (-90, -60)))
+    ]
     path = np.array([[x, -20, z] for side in rim for x, z in side])
     # The inner side of the board, x = -10, is seen too; its far edge is at y = 0.
     far = np.array([[-10, 0, z] for z in np.linspace(-60, 60, 400)])
@@ -66,7 +68,7 @@ def test_an_edge_between_two_faces_of_one_board_is_drawn():
     front = view(CAMERAS["pinhole"])
     lines = draw(MESHES[:1], front).lines
     column, row = np.floor(front.project(np.array([[-10.0, -20, 0]]))[0][0]).astype(int)
-    assert lines[row, column - 1:column + 1].max() > 0.4
+    assert lines[row, column - 1 : column + 1].max() > 0.4
 
 
 def test_pictures_change_only_where_boards_are():

@@ -40,22 +40,37 @@ def board(name: str, x: float, **more) -> Board:
     edges = tuple(Line(start=a, end=b) for a, b in zip(corners, corners[1:] + corners[:1], strict=True))
     pose = ((0, 0, 1, x), (1, 0, 0, -150), (0, 1, 0, 0), (0, 0, 0, 1))
     return Board(
-        name=name, model_from_board=pose, thickness=Quantity(value=18, standard_error=0.12),
-        cut_path=CutPath(outer=Loop(edges=edges)), **more
+        name=name,
+        model_from_board=pose,
+        thickness=Quantity(value=18, standard_error=0.12),
+        cut_path=CutPath(outer=Loop(edges=edges)),
+        **more,
     )
 
 
 BEVEL = Bevel(start=(300, 80), end=(0, 80), point=(0, 80, 0), normal=(0, 0.98, 0.2), angle=Quantity(value=11.5))
 CONTACT = Contact(
-    type=2, a="left", b=HOSTILE, face_a="top", face_b="edge", point=(0, 0, 0), normal=(1, 0, 0), interface=(),
-    area=1440.0, angle=90.0, evidence=ContactEvidence(seam_score=0.8, seam_score_other=0.3, views=5, decided_by="seam"),
+    type=2,
+    a="left",
+    b=HOSTILE,
+    face_a="top",
+    face_b="edge",
+    point=(0, 0, 0),
+    normal=(1, 0, 0),
+    interface=(),
+    area=1440.0,
+    angle=90.0,
+    evidence=ContactEvidence(seam_score=0.8, seam_score_other=0.3, views=5, decided_by="seam"),
 )
 MODEL = Model(
-    name="a <b>tray</b>", boards=(
-        board("left", 0), board("right", 200, same_as="left", mirrored=True),
+    name="a <b>tray</b>",
+    boards=(
+        board("left", 0),
+        board("right", 200, same_as="left", mirrored=True),
         board(HOSTILE, 100, bevels=(BEVEL,), notes=("inferred & doubtful",)),
     ),
-    contacts=(CONTACT,), scale=Scale(millimetres_per_unit=500, origin="given"),
+    contacts=(CONTACT,),
+    scale=Scale(millimetres_per_unit=500, origin="given"),
     findings=(
         Finding(code="K003", severity="warning", message="a warning"),
         Finding(code="K110", severity="error", message="an error", remedy="mend it"),
@@ -113,11 +128,19 @@ def test_it_needs_nothing_from_elsewhere(capture):
 def test_it_says_what_the_model_says(capture):
     text = Page(report_html(MODEL, capture, COLOURS)).text
     for words in (
-        "a <b>tray</b>", "3 boards, 2 different; 1 contacts", "500 mm, given", "left, right",
-        "2, 1 of them turned over", "300.0 × 80.0 mm", "18.00 mm ± 0.12, measured", "+11.5°", "inferred & doubtful",
+        "a <b>tray</b>",
+        "3 boards, 2 different; 1 contacts",
+        "500 mm, given",
+        "left, right",
+        "2, 1 of them turned over",
+        "300.0 × 80.0 mm",
+        "18.00 mm ± 0.12, measured",
+        "+11.5°",
+        "inferred & doubtful",
         HOSTILE,
         "edge on face, at a corner 14.4 90.0 seam in the photographs: 0.80 against 0.30 in 5 views",
-        "error K110 an error mend it warning K003 a warning", "1.2 from c: 2 photographs, 900 points",
+        "error K110 an error mend it warning K003 a warning",
+        "1.2 from c: 2 photographs, 900 points",
     ):
         assert words in text, words
 
@@ -207,12 +230,30 @@ window.addEventListener("load", () => drawn(() => {
 def test_it_runs_in_a_browser(capture, tmp_path):
     page = tmp_path / "report.html"
     page.write_text(report_html(MODEL, capture, COLOURS).replace("</body>", PROBE + "</body>"))
-    done = subprocess.run([
-        CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--use-angle=swiftshader",
-        "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-background-networking",
-        "--disable-component-update", "--disable-sync", f"--user-data-dir={tmp_path / 'profile'}",
-        "--window-size=1000,900", "--enable-logging=stderr", "--virtual-time-budget=8000", "--dump-dom", page.as_uri(),
-    ], capture_output=True, text=True, timeout=90)
+    done = subprocess.run(
+        [
+            CHROMIUM,
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--use-angle=swiftshader",
+            "--enable-unsafe-swiftshader",
+            "--disable-quic",
+            "--no-first-run",
+            "--disable-background-networking",
+            "--disable-component-update",
+            "--disable-sync",
+            f"--user-data-dir={tmp_path / 'profile'}",
+            "--window-size=1000,900",
+            "--enable-logging=stderr",
+            "--virtual-time-budget=8000",
+            "--dump-dom",
+            page.as_uri(),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=90,
+    )
     console = [line for line in done.stderr.splitlines() if "CONSOLE" in line and "GL Driver Message" not in line]
     assert console == []
     said = json.loads(Page(re.search(r"<title>.*?</title>", done.stdout, re.S).group(0)).text)

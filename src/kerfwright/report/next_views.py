@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kerfwright.capture.types import View
 from kerfwright.report.meshes import BoardMesh
+
+if TYPE_CHECKING:
+    from kerfwright.capture.types import View
 
 __all__ = ["NextView", "next_views"]
 

@@ -6,10 +6,10 @@ import json
 from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kerfwright.capture.types import Capture
 from kerfwright.model import Model
 from kerfwright.report.cards import boards_section
 from kerfwright.report.deviation import Deviation, deviation
@@ -19,6 +19,9 @@ from kerfwright.report.photographs import photographs_section
 from kerfwright.report.scene import scene
 from kerfwright.report.tables import contacts_section, findings_section, next_section
 from kerfwright.report.views import best_views
+
+if TYPE_CHECKING:
+    from kerfwright.capture.types import Capture
 
 __all__ = ["report_html"]
 

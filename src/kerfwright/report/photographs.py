@@ -5,13 +5,16 @@ from __future__ import annotations
 import base64
 from collections.abc import Iterable, Sequence
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kerfwright.capture.types import View
 from kerfwright.report.meshes import BoardMesh
 from kerfwright.report.overlay import LINE_COLOUR, draw, shaded
 from kerfwright.report.views import scaled
+
+if TYPE_CHECKING:
+    from kerfwright.capture.types import View
 
 __all__ = ["photographs_section"]
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kerfwright.capture.types import Capture, View
 from kerfwright.model import Finding
+
+if TYPE_CHECKING:
+    from kerfwright.capture.types import Capture, View
 
 __all__ = ["Survey", "survey"]
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kerfwright.capture.camera import Camera
-from kerfwright.capture.types import View
+if TYPE_CHECKING:
+    from kerfwright.capture.types import View
 
 __all__ = ["best_views", "scaled"]
 
@@ -48,7 +49,7 @@ def scaled(view: View, photo: np.ndarray, width: int) -> tuple[View, np.ndarray]
     """The view and its photograph at no more than `width` pixels across."""
     import cv2
 
-    from kerfwright.capture.camera import CAMERA_MODELS
+    from kerfwright.capture.camera import CAMERA_MODELS, Camera
 
     camera = view.camera
     if camera.width <= width:
