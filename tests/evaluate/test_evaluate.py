@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kerfwright.capture import write_ply
 from kerfwright.errors import CaptureError, OptionError, OutputError
 from kerfwright.evaluate import evaluate, evaluate_model, read_truth
 from kerfwright.evaluate.nodes import loop_nodes, true_nodes
@@ -15,7 +16,7 @@ from kerfwright.evaluate.touching import touching_pairs
 from kerfwright.model.io import write_model
 from kerfwright.synthetic import random_assembly, tiny_assembly, tiny_capture
 from kerfwright.synthetic.carpentry import given, slab
-from kerfwright.synthetic.files import write_cloud, write_frame, write_truth
+from kerfwright.synthetic.files import write_frame, write_truth
 from kerfwright.synthetic.meshes import mesh_in_model
 
 SCORER = Path("/work/shared/tools/score.py")
@@ -35,7 +36,7 @@ def truth_folder(folder, model, cloud=None):
     if cloud is not None:
         m = capture_from_model()
         moved = type(cloud)(cloud.points @ m[:3, :3].T + m[:3, 3], cloud.normals @ TURN.T, cloud.colours)
-        write_cloud(folder / "cloud.ply", moved)
+        write_ply(folder / "cloud.ply", moved)
     return folder / "truth"
 
 
@@ -119,7 +120,10 @@ def test_listed_contacts_are_scored_where_rough_boards_do_not_touch(tiny):
     model = tiny_assembly()
     apart = changed(model, "top", model_from_board=raised(model.boards[0], 3.0))
     assert evaluate_model(placed(apart), read_truth(tiny))["contacts_right"] == 0
-    assert evaluate_model(placed(apart), read_truth(tiny), listed_contacts=True)["contacts_typed_right"] == 2
+    rough = evaluate_model(placed(apart), read_truth(tiny), rough=True)
+    assert rough["contacts_typed_right"] == 2
+    assert rough["rough_missing"] == rough["rough_extra"] == ["top"]  # 3 mm off is another plane
+    assert rough["rough_thickness_mm"] == {"left": 0.0, "right": 0.0}
 
 
 @pytest.mark.parametrize("family", ["stool", "tilted_stool", "rack", "tray"])

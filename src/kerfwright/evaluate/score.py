@@ -9,11 +9,14 @@ import numpy as np
 
 from kerfwright.evaluate.figures import GOOD, board_figures, match_boards, shown_boards, surface_figures
 from kerfwright.evaluate.nodes import compare_nodes
+from kerfwright.evaluate.rough import rough_figures
 from kerfwright.evaluate.stages import stage_model
 from kerfwright.evaluate.surfaces import Body, Mesh
 from kerfwright.evaluate.touching import Touch, compare_touches, touching_pairs
 from kerfwright.evaluate.truth import Truth, read_truth
 from kerfwright.model import Model
+from kerfwright.solid import assembly_solids
+from kerfwright.synthetic.meshes import mesh_in_model
 
 __all__ = ["evaluate", "evaluate_model"]
 
@@ -40,37 +43,40 @@ def evaluate(model_dir: Path | str, truth_dir: Path | str, stage: str | None = N
         If either folder lacks what it should hold.
     """
     model, truth = stage_model(Path(model_dir), stage), read_truth(Path(truth_dir))
-    return evaluate_model(model, truth, listed_contacts=stage == "assemble")
+    return evaluate_model(model, truth, rough=stage in ("identify", "assemble"))
 
 
-def evaluate_model(model: Model, truth: Truth, listed_contacts: bool = False) -> dict[str, object]:
+def evaluate_model(model: Model, truth: Truth, rough: bool = False) -> dict[str, object]:
     """The same for a model and a truth in memory.
 
     Parameters
     ----------
-    listed_contacts : bool
-        Count the contacts that the model lists, not those that its surfaces make.
+    rough : bool
+        The boards are not cut to fit yet: count the contacts that the model lists instead of those that its surfaces
+        make, count boards by sheet plane and region besides, and leave out what asks for solids and nodes.
     """
-    solids = _solids(model)
     truth_from_model = np.linalg.inv(truth.capture_from_truth) @ np.array(model.capture_from_model)
-    found = [_moved(truth_from_model, _mesh(solid)) for _, solid in solids]
-    true = [board.mesh for board in truth.boards]
-    if not found:
+    if not model.boards:
         return _nothing(truth)
+    solids = [] if rough else assembly_solids(model)
+    meshes = [mesh_in_model(b) for b in model.boards] if rough else [_mesh(solid) for _, solid in solids]
+    found = [_moved(truth_from_model, mesh) for mesh in meshes]
+    true = [board.mesh for board in truth.boards]
     overlap, match = match_boards(true, found)
-    touches, pairs = _touches(model, truth, found, match, listed_contacts)
+    touches, pairs = _touches(model, truth, found, match, rough)
     want = touching_pairs(true, [b.normal for b in truth.boards])
     out = {**_part_figures(model, truth, overlap, match), **surface_figures(true, found, truth.cloud)}
     out |= compare_touches(want, touches, [b.name for b in truth.boards]) | {"contacts_found": pairs}
-    out["boards"] = _boards(model, truth, found, overlap, match, truth_from_model)
-    out |= _node_sums(out["boards"]) | _solid_figures(solids, truth_from_model)
-    return out if truth.cloud is None else out | _seen_figures(truth, overlap, match, want, touches, out["boards"])
-
-
-def _solids(model: Model) -> list:
-    from kerfwright.solid import assembly_solids
-
-    return assembly_solids(model)
+    out["boards"] = _boards(truth, model, found, overlap, match)
+    if truth.cloud is not None:
+        out |= _seen_figures(truth, overlap, match, want, touches, out["boards"])
+    if rough:
+        return out | rough_figures(truth, model, truth_from_model)
+    return (
+        out
+        | _node_figures(truth, model, match, truth_from_model, out["boards"])
+        | _solid_figures(solids, truth_from_model)
+    )
 
 
 def _mesh(solid) -> Mesh:
@@ -128,19 +134,27 @@ def _listed(model: Model) -> dict[tuple[int, int], Touch]:
     return out
 
 
-def _boards(model: Model, truth: Truth, found: list[Mesh], overlap, match, truth_from_model) -> dict[str, dict]:
+def _boards(truth: Truth, model: Model, found: list[Mesh], overlap, match) -> dict[str, dict]:
     """Figures of every matched board, by the true board's name."""
-    out = {}
+    return {
+        truth.boards[i].name: {
+            "board": model.boards[j].name,
+            "iou": float(overlap[i, j]),
+            **board_figures(truth.boards[i], found[j]),
+        }
+        for i, j in sorted(match.items())
+    }
+
+
+def _node_figures(truth: Truth, model: Model, match, truth_from_model, boards: dict[str, dict]) -> dict[str, int]:
+    """Nodes of the cut paths, over all matched boards and noted at each."""
+    sums = {f"nodes_{key}": 0 for key in ("true", "found", "right_kind", "spurious")}
     for i, j in sorted(match.items()):
-        own = {"board": model.boards[j].name, "iou": float(overlap[i, j]), **board_figures(truth.boards[i], found[j])}
-        nodes = compare_nodes(truth.boards[i], model.boards[j], truth_from_model)
-        out[truth.boards[i].name] = own | {"nodes": asdict(nodes)}
-    return out
-
-
-def _node_sums(boards: dict[str, dict]) -> dict[str, int]:
-    keys = ("true", "found", "right_kind", "spurious")
-    return {f"nodes_{key}": sum(b["nodes"][key] for b in boards.values()) for key in keys}
+        nodes = asdict(compare_nodes(truth.boards[i], model.boards[j], truth_from_model))
+        boards[truth.boards[i].name]["nodes"] = nodes
+        for key, count in nodes.items():
+            sums[f"nodes_{key}"] += count
+    return sums
 
 
 def _solid_figures(solids: list, truth_from_model: np.ndarray) -> dict[str, object]:

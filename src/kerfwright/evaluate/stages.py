@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["STAGES", "stage_model"]
 
 STAGES = ("identify", "assemble", "refine")
+OUTLINE_MM = 0.3  # rough outlines are ragged by several; thousands of edges would only slow their scoring down
 
 
 def stage_model(folder: Path, stage: str | None) -> Model:
@@ -54,7 +55,7 @@ def _kept(folder: Path, stage: str):
 def sheet_board(sheet: Sheet) -> Board:
     """A rough board with its region as cut path; of several pieces the largest."""
     polygon = max(shapely.get_parts(sheet.region), key=lambda p: p.area)
-    polygon = shapely.orient_polygons(polygon.simplify(0.05))
+    polygon = shapely.orient_polygons(polygon.simplify(OUTLINE_MM))
     path = CutPath(outer=_loop(polygon.exterior), holes=tuple(_loop(ring) for ring in polygon.interiors))
     return Board(
         name=sheet.name,

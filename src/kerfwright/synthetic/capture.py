@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from kerfwright.capture import Camera, Capture, Cloud, View
+from kerfwright.capture import Camera, Capture, Cloud, View, write_colmap_text, write_ply
 from kerfwright.errors import OutputError
 from kerfwright.model import Model, Scale
 from kerfwright.synthetic.cameras import camera_path, camera_rays, intrinsics
 from kerfwright.synthetic.cloud import stereo_cloud
-from kerfwright.synthetic.files import write_cloud, write_colmap, write_frame, write_truth
+from kerfwright.synthetic.files import write_frame, write_truth
 from kerfwright.synthetic.options import CaptureOptions, DatasetOptions
 from kerfwright.synthetic.render import photograph
 from kerfwright.synthetic.stage import Stage, build_stage
@@ -98,8 +98,10 @@ def write_capture(assembly: Model, folder: Path | str, options: CaptureOptions |
         _write_picture(folder / "images" / name, picture, options.images.quality)
     turn, capture_from_model = _frame(options.dataset)
     camera, poses = _recovered(session)
-    write_colmap(folder / "sparse" / "0", camera, names, [_rescaled(p, capture_from_model) for p in poses])
-    write_cloud(folder / "cloud.ply", _laid(session.cloud(), capture_from_model))
+    poses = [_rescaled(pose, capture_from_model) for pose in poses]
+    views = [View(n, folder / "images" / n, camera, p) for n, p in zip(names, poses, strict=True)]
+    write_colmap_text(folder / "sparse" / "0", views)
+    write_ply(folder / "cloud.ply", _laid(session.cloud(), capture_from_model))
     write_truth(folder / "truth", assembly)
     write_frame(folder / "truth", options.dataset.scale, turn, options.dataset.shift)
     return folder

@@ -154,7 +154,8 @@ def _moved(stage, samples: _Samples, options: CloudOptions, rng) -> np.ndarray:
     normal = stage.normals[samples.triangle].astype(float)
     pixel = samples.pixel / REFERENCE_PIXEL
     cosine = np.abs(np.einsum("ij,ij->i", normal, samples.toward)).clip(0.2)
-    drift = SmoothNoise(rng)(samples.x / options.drift_length) * options.drift
+    near, wide = (SmoothNoise(rng)(samples.x / (k * options.drift_length)) for k in (1, 3))
+    drift = (0.85 * near + 0.5 * wide) * options.drift
     white = rng.normal(size=len(pixel)) * options.noise
     rough = SmoothNoise(rng)(samples.x / 9) + rng.normal(0, 0.7, len(pixel))
     tail = rough > np.quantile(rough, 1 - options.tail) if options.tail else np.zeros(len(pixel), bool)

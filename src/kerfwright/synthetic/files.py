@@ -1,8 +1,4 @@
-"""The capture folder: photographs, COLMAP text, PLY, and the truth beside them.
-
-The formats are those of ../shared/captures: capture files in the capture's frame and unit, truth in metres with the
-floor at z = 0 and frame.json to lay one on the other.
-"""
+"""The truth beside a capture, as in ../shared/captures: metres, floor at z = 0, frame.json to lay it on the capture."""
 
 from __future__ import annotations
 
@@ -11,51 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from kerfwright.capture import Camera, Cloud
 from kerfwright.model import Arc, Bezier, Board, Circle, Contact, Edge, Line, Loop, Model
 from kerfwright.model.frames import matrix
 from kerfwright.model.geometry import edge_end, edge_length, edge_start
 from kerfwright.synthetic.meshes import board_mesh, mesh_in_model, volume
 
-__all__ = ["write_cloud", "write_colmap", "write_frame", "write_truth"]
+__all__ = ["write_frame", "write_truth"]
 
 _KINDS = {Line: "line", Arc: "circle", Circle: "circle", Bezier: "bspline"}
-
-
-def write_cloud(path: Path, cloud: Cloud) -> None:
-    """Binary little-endian PLY: x y z nx ny nz float, red green blue uchar."""
-    fields = [(n, "<f4") for n in ("x", "y", "z", "nx", "ny", "nz")] + [(n, "u1") for n in ("red", "green", "blue")]
-    rows = np.zeros(len(cloud), fields)
-    for k, name in enumerate("xyz"):
-        rows[name], rows[f"n{name}"] = cloud.points[:, k], cloud.normals[:, k]
-    for k, name in enumerate(("red", "green", "blue")):
-        rows[name] = 200 if cloud.colours is None else cloud.colours[:, k]
-    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(cloud)}"]
-    header += [f"property {'float' if kind == '<f4' else 'uchar'} {name}" for name, kind in fields]
-    path.write_bytes("\n".join([*header, "end_header\n"]).encode() + rows.tobytes())
-
-
-def write_colmap(folder: Path, camera: Camera, names: list[str], poses: np.ndarray) -> None:
-    """COLMAP's text model; poses (V, 4, 4) are camera_from_capture."""
-    folder.mkdir(parents=True, exist_ok=True)
-    parameters = " ".join(f"{p:.9g}" for p in camera.params)
-    (folder / "cameras.txt").write_text(
-        f"# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n1 {camera.model} {camera.width} {camera.height} {parameters}\n"
-    )
-    lines = ["# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME", "# POINTS2D[] as (X, Y, POINT3D_ID)"]
-    for k, (name, pose) in enumerate(zip(names, poses, strict=True), 1):
-        numbers = " ".join(f"{v:.12g}" for v in (*_quaternion(pose[:3, :3]), *pose[:3, 3]))
-        lines += [f"{k} {numbers} 1 {name}", ""]
-    (folder / "images.txt").write_text("\n".join(lines) + "\n")
-    (folder / "points3D.txt").write_text("# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n")
-
-
-def _quaternion(turn: np.ndarray) -> np.ndarray:
-    """(w, x, y, z) of a rotation matrix."""
-    from scipy.spatial.transform import Rotation
-
-    x, y, z, w = Rotation.from_matrix(turn).as_quat()
-    return np.array([w, x, y, z]) * (1 if w >= 0 else -1)
 
 
 def write_truth(folder: Path, model: Model) -> None:

@@ -59,7 +59,7 @@ class CloudOptions:
     bias: float = 0.0  # outward shift of the whole surface, mm
     tail: float = 0.04  # share of points whose noise is many times larger
     tail_factor: float = 6.0
-    fringe: float = 0.035  # share of points beside silhouettes
+    fringe: float = 0.06  # share of points beside silhouettes
     fringe_width: float = 5.0  # px over which the object's surface runs on past its silhouette
     normal_noise: float = 1.6  # degrees
     normal_flips: float = 0.004  # share turned round
@@ -103,6 +103,8 @@ PRESETS = {
         ),
         cloud=CloudOptions(floor=True, noise=0.16, drift=0.2, tail=0.08, normal_flips=0.02),
     ),
+    # dark or shiny wood and few pictures: twice the fringe, a third of the surface bare, tails three times as thick
+    "rough": CaptureOptions(cloud=CloudOptions(noise=0.18, drift=0.25, tail=0.12, fringe=0.12, dropout=0.3)),
     # the surface sits too far out everywhere, as it did in two of the seven shared captures
     "biased": CaptureOptions(cloud=CloudOptions(bias=0.35)),
     # small and coarse, made in seconds: for trying the program out

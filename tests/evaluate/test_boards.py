@@ -1,0 +1,116 @@
+"""The accuracy and speed boards: rows, changes, growth, variants."""
+
+import importlib
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kerfwright.capture import open_capture
+from kerfwright.synthetic import (
+    CaptureOptions,
+    CloudOptions,
+    DatasetOptions,
+    ImageOptions,
+    tiny_assembly,
+    write_capture,
+)
+
+BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
+
+
+@pytest.fixture(scope="module")
+def bench():
+    sys.path.insert(0, str(BENCHMARKS))
+    yield lambda name: importlib.import_module(name)
+    sys.path.remove(str(BENCHMARKS))
+
+
+@pytest.fixture(scope="module")
+def capture(tmp_path_factory):
+    options = CaptureOptions(
+        dataset=DatasetOptions(images=6, width=160, height=120),
+        images=ImageOptions(samples=1, texels=0.01, floor_texels=256, room_nodes=8, light_rays=4),
+        cloud=CloudOptions(points=3000, views=2),
+    )
+    return write_capture(tiny_assembly(), tmp_path_factory.mktemp("bench") / "tiny", options)
+
+
+def score(**changes):
+    board = {"thickness_mm": -0.3, "angle_deg": 0.1, "cut_mm": [0.5, 1.0], "thickness_seen": True}
+    whole = {
+        "parts_true": 3, "parts_found": 3, "parts_matched": 3, "extra": [], "mean_iou_seen": 0.97,
+        "rmse_pct_seen_to_model": 0.15, "rmse_pct_cloud_to_model": 0.21, "rmse_pct_cloud_to_truth": 0.2,
+        "contacts_true": 2, "contacts_found": 2, "contacts_typed_right": 2, "contacts_area_right": 2,
+        "interference_mm3": 0.0, "nodes_true": 12, "nodes_right_kind": 11, "nodes_spurious": 1, "boards": {"a": board},
+    }  # fmt: skip
+    run = {"seconds": 12.0, "peak_gib": 1.5, "stages": {"identify": 3.0}}
+    return {"score": whole | changes, "run": run, "images": 30}
+
+
+def test_board_shows_changes_known_failures_and_surprises(bench):
+    accuracy = bench("accuracy")
+    rows = {"good": score(), "bad": score(parts_matched=2), "odd": score()}
+    page = accuracy.board(rows, {"good": score(rmse_pct_seen_to_model=0.2)}, {"odd": "glass", "bad": "hidden rail"})
+    lines = {line.split(" | ")[0].strip("| "): line for line in page.splitlines() if line.startswith("| ")}
+    assert "0.150 (-0.050)" in lines["good"]
+    assert lines["good"].endswith("ok |")
+    assert "known: hidden rail" in lines["bad"]
+    assert "UNEXPECTED PASS" in lines["odd"]
+    assert len({line.count("|") for line in lines.values()}) == 1
+    assert "2 of 3 captures right" in page
+
+
+def test_a_failed_run_is_a_row_and_not_a_crash(bench):
+    accuracy = bench("accuracy")
+    row = {"error": "no plane | found", "run": {"seconds": 3.0, "peak_gib": None, "stages": {}}, "images": 5}
+    page = accuracy.board({"lost": row, "stool": row}, {}, {})
+    assert page.count("**FAILS**: no plane / found") == 2
+    assert "stool, paper" in page
+
+
+def test_growth_is_the_exponent_of_size(bench):
+    speed = bench("speed")
+    sizes = (10, 100, 1000)
+    assert speed.exponent(sizes, [n**1.5 * 1e-3 for n in sizes]) == pytest.approx(1.5)
+    assert speed.exponent(sizes, [1e-3] * 3) is None  # too quick to time
+
+
+def test_runs_read_what_run_json_says(bench, tmp_path):
+    (tmp_path / "run.json").write_text(
+        json.dumps({"seconds": {"identify": 2.0, "refine": 3.0}, "peak_memory_gib": 0.7})
+    )
+    run = bench("runs").reconstruct(Path("nowhere"), tmp_path, reuse=True)
+    assert (run.seconds, run.peak_gib, run.stages["refine"]) == (5.0, 0.7, 3.0)
+
+
+@pytest.mark.parametrize("count", [1000, 9000])
+def test_variants_have_as_many_points_and_lie_where_they_lay(bench, capture, tmp_path, count):
+    before = open_capture(capture).cloud
+    after = open_capture(bench("variants").with_points(capture, tmp_path / "v", count)).cloud
+    assert len(after) == count
+    from scipy.spatial import cKDTree
+
+    assert cKDTree(before.points).query(after.points)[0].max() < 0.01 * before.diameter
+
+
+def test_fewer_photographs_and_fewer_pixels_keep_their_cameras(bench, capture, tmp_path):
+    variants = bench("variants")
+    fewer = open_capture(variants.with_images(capture, tmp_path / "i", 3))
+    assert len(fewer.views) == 3
+    assert fewer.views[-1].image().shape == (120, 160, 3)
+    small = open_capture(variants.with_pixels(capture, tmp_path / "p", 0.5))
+    assert small.views[0].image().shape == (60, 80, 3)
+    x = np.array([[0.0, 0.0, 0.1]])
+    whole = open_capture(capture).views[0].project(x)[0]
+    assert small.views[0].project(x)[0] == pytest.approx(whole / 2)
+
+
+def test_captures_are_found_in_folders_of_them(bench, capture):
+    captures_in = bench("runs").captures_in
+    assert list(captures_in([capture])) == [capture]
+    assert list(captures_in([capture.parent])) == [capture]
+    with pytest.raises(SystemExit, match="none in it"):
+        list(captures_in([capture / "truth"]))
