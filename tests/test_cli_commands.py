@@ -76,15 +76,18 @@ def test_export_is_forbidden_by_an_error_unless_forced(kerfwright, overlapping, 
     assert forced.returncode == 0 and "NOT VERIFIED" in (tmp_path / "out" / "model.step").read_text()
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    (("check", "{}/none.json"), ["none.json"]),
-    (("export", "{}/model.json", "stl5", "-o", "{}/out"), ["stl5", "step"]),
-    (("export", "{}/none.json", "step", "-o", "{}/out"), ["none.json"]),
-    (("export", "{}/model.json", "step", "-o", "{}/model.json"), ["is a file"]),
-    (("view", "{}"), ["report.html", "kerfwright reconstruct"]),
-    (("info", "{}/none"), ["none"]),
-    (("info", "{}", "--up", "w"), ["--up: w"]),
-])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("check", "{}/none.json"), ["none.json"]),
+        (("export", "{}/model.json", "stl5", "-o", "{}/out"), ["stl5", "step"]),
+        (("export", "{}/none.json", "step", "-o", "{}/out"), ["none.json"]),
+        (("export", "{}/model.json", "step", "-o", "{}/model.json"), ["is a file"]),
+        (("view", "{}"), ["report.html", "kerfwright reconstruct"]),
+        (("info", "{}/none"), ["none"]),
+        (("info", "{}", "--up", "w"), ["--up: w"]),
+    ],
+)
 def test_bad_input_is_one_line_and_exit_code_2(kerfwright, sound, tmp_path, arguments, words):
     done = kerfwright(*(a.format(tmp_path) for a in arguments))
     assert done.returncode == 2 and done.stdout == ""
@@ -95,7 +98,7 @@ def test_bad_input_is_one_line_and_exit_code_2(kerfwright, sound, tmp_path, argu
 
 def test_info_of_the_shipped_capture(kerfwright):
     done = kerfwright("info", demo_capture())
-    assert done.returncode == 0 and "20, 1024x768, PINHOLE" in done.stdout and "120000 points" in done.stdout
+    assert done.returncode == 0 and "20, 1024x768, PINHOLE" in done.stdout and "points, with colours" in done.stdout
     assert done.stdout.splitlines()[-1] == "This is enough."
     scaled = json.loads(kerfwright("info", demo_capture(), "--json", "--scale", 2000).stdout)
     assert scaled["scale_origin"] == "given" and 800 < scaled["extent_mm"][2] < 820
@@ -141,13 +144,16 @@ def test_evaluate_tells_what_is_missing(kerfwright, sound, tmp_path):
     assert figures["parts_true"] == 4 and figures["extra"] == ["a"]
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    (("evaluate", "{}", "{}/none"), ["none"]),
-    (("evaluate", "{}", "{}", "--stage", "guess"), ["guess", "identify"]),
-    (("synth", "spaceship", "-o", "{}/out"), ["spaceship", "stool"]),
-    (("synth", "stool", "-o", "{}/out", "--preset", "x"), ["--preset: x", "quick"]),
-    (("synth", "stool", "-o", "{}/out", "--boards", "9"), ["boards: 9"]),
-])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("evaluate", "{}", "{}/none"), ["none"]),
+        (("evaluate", "{}", "{}", "--stage", "guess"), ["guess", "identify"]),
+        (("synth", "spaceship", "-o", "{}/out"), ["spaceship", "stool"]),
+        (("synth", "stool", "-o", "{}/out", "--preset", "x"), ["--preset: x", "quick"]),
+        (("synth", "stool", "-o", "{}/out", "--boards", "9"), ["boards: 9"]),
+    ],
+)
 def test_bad_input_of_the_measuring_commands(kerfwright, sound, tmp_path, arguments, words):
     done = kerfwright(*(a.format(tmp_path) for a in arguments))
     assert done.returncode == 2 and done.stderr.count("\n") == 1, done.stderr
@@ -159,6 +165,7 @@ def test_synth_makes_a_capture_that_opens(kerfwright, monkeypatch, tmp_path):
     from dataclasses import replace
 
     from kerfwright import synthetic
+    from kerfwright.capture import open_capture
 
     quick = synthetic.PRESETS["quick"]
     dataset = replace(quick.dataset, images=2, width=96, height=72)
@@ -167,6 +174,6 @@ def test_synth_makes_a_capture_that_opens(kerfwright, monkeypatch, tmp_path):
     monkeypatch.setitem(synthetic.PRESETS, "quick", tiny)
     done = kerfwright("synth", "single", "-o", tmp_path / "out", "--preset", "quick")
     assert done.returncode == 0, done.stderr
-    found = json.loads(kerfwright("info", tmp_path / "out", "--json").stdout)
-    assert found["images"] == 2 and found["points"] > 100
+    found = open_capture(tmp_path / "out")
+    assert len(found.views) == 2 and len(found.cloud) > 100 and found.views[0].image().shape == (72, 96, 3)
     assert (tmp_path / "out" / "truth" / "truth.json").exists()
