@@ -1,9 +1,17 @@
-.PHONY: demo test lint accuracy speed
+.PHONY: accuracy demo lint speed test
 
 PYTHON = .venv/bin/python
+# Folders of captures with truth that the accuracy board runs over.
+CAPTURES = fixtures/stool
 
 demo test:
 	sh bootstrap.sh $@
+
+accuracy: .venv/installed
+	$(PYTHON) benchmarks/accuracy.py $(CAPTURES) --out board-out
+
+speed: .venv/installed
+	$(PYTHON) benchmarks/speed.py fixtures/stool --out board-out
 
 lint: .venv/installed
 	$(PYTHON) -m pip install --quiet --disable-pip-version-check '.[dev]'
