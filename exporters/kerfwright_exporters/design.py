@@ -1,0 +1,250 @@
+"""What of a model depends on what: the reading that makes a parametric program of it.
+
+A board's sheet keeps one reference plane (a face on the object's border, a face that lies on another board's sheet,
+or the middle where its end is pointed) and grows from there with its stock. Where its outline ends on another
+board's sheet or on the floor, the outline is drawn over and cut off at that face, so that length and bevel follow from
+the neighbour. Everything else is stretched with the object's width, depth and height.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kerfwright.model import Board, Contact, Edge, Line, Loop, Model
+from kerfwright.model.frames import model_from_board, transform_points, transform_vectors
+from kerfwright.model.geometry import edge_length, edge_start, edge_tangents, sample_edge, sample_loop, transform_loop
+from kerfwright.solid import assembly_solids
+from kerfwright.solid.faces import shape_of
+
+__all__ = ["BoardDesign", "FreeCut", "NeighbourCut", "design_boards", "model_box"]
+
+ON_PLANE = 0.05  # mm between an outline's edge and the face that it ends on
+OVERDRAW = 30.0  # mm that an outline is drawn over a face that will cut it
+PARALLEL = 1e-3  # rad between an edge and a plane along it
+
+
+@dataclass(frozen=True, eq=False)
+class NeighbourCut:
+    """The board ends on a face ("top" or "bottom") of another, by number."""
+
+    board: int
+    face: str
+
+
+@dataclass(frozen=True, eq=False)
+class FreeCut:
+    """The board ends on a plane of its own: the floor, or a bevel that touches nothing. The normal looks towards it."""
+
+    point: np.ndarray
+    normal: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class BoardDesign:
+    """How one board is drawn: frame (origin, x, y in the model, mm), outline about the origin, and what cuts it."""
+
+    board: Board
+    origin: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    below: float
+    size: tuple[float, float]
+    outline: Loop
+    holes: tuple[Loop, ...]
+    cuts: tuple[NeighbourCut | FreeCut, ...]
+    rests_on: NeighbourCut | None = None  # face that its sheet lies on
+
+
+def model_box(model: Model) -> np.ndarray:
+    """Lowest and highest corner (2, 3) of the object, mm."""
+    boxes = np.stack([shape_of(name, solid).box for name, solid in assembly_solids(model)])
+    return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+
+def _corners(board: Board) -> np.ndarray:
+    """Points (N, 3) of both faces' outlines, model frame."""
+    flat = sample_loop(board.cut_path.outer)
+    faces = [np.column_stack([flat, np.full(len(flat), z)]) for z in (0.0, board.thickness.value)]
+    return transform_points(model_from_board(board), np.concatenate(faces))
+
+
+def design_boards(model: Model) -> list[BoardDesign]:
+    """The design of every board, in the model's order."""
+    box = model_box(model)
+    return [_design(model, k, box) for k in range(len(model.boards))]
+
+
+def _design(model: Model, index: int, box: np.ndarray) -> BoardDesign:
+    board = model.boards[index]
+    pose = model_from_board(board)
+    flat = sample_loop(board.cut_path.outer)
+    centre, size = (flat.min(axis=0) + flat.max(axis=0)) / 2, np.ptp(flat, axis=0)
+    rests_on, face = _rests(model, index)
+    below = face if face is not None else _reference(board, box)
+    origin = transform_points(pose, [*centre, below * board.thickness.value])
+    cuts, edges = _cuts(model, index)
+    return BoardDesign(
+        board=board,
+        origin=origin,
+        x=pose[:3, 0],
+        y=pose[:3, 1],
+        below=below,
+        size=(float(size[0]), float(size[1])),
+        outline=_centred(_overdrawn(board.cut_path.outer, edges), centre),
+        holes=tuple(_centred(hole, centre) for hole in board.cut_path.holes),
+        cuts=tuple(cuts),
+        rests_on=rests_on,
+    )
+
+
+def _centred(loop: Loop, centre: np.ndarray) -> Loop:
+    return transform_loop(loop, np.array([[1, 0, -centre[0]], [0, 1, -centre[1]]], float))
+
+
+def _reference(board: Board, box: np.ndarray) -> float:
+    """Share of the thickness under the plane that stays: 0 the bottom, 1 the top, a half the middle."""
+    stretches = [(b.start, b.end) for b in board.bevels]
+    if len(set(stretches)) < len(stretches):
+        return 0.5
+    points = _corners(board)
+    half = len(points) // 2
+    for below, face in ((0.0, points[:half]), (1.0, points[half:])):
+        flat = np.abs(np.ptp(face, axis=0)) < ON_PLANE
+        if (flat & (np.abs(face[0] - box).min(axis=0) < ON_PLANE)).any():
+            return below
+    return 0.0
+
+
+def _rests(model: Model, index: int) -> tuple[NeighbourCut | None, float | None]:
+    """The earlier board's face that this board's sheet lies on, and which of its own faces that is."""
+    names = [board.name for board in model.boards]
+    for contact in model.contacts:
+        if contact.type != 3:
+            continue
+        a, b = names.index(contact.a), names.index(contact.b)
+        if max(a, b) == index:
+            other, face, own = (
+                (a, contact.face_a, contact.face_b) if b == index else (b, contact.face_b, contact.face_a)
+            )
+            return NeighbourCut(other, face), 1.0 if own == "top" else 0.0
+    return None, None
+
+
+def _cuts(model: Model, index: int) -> tuple[list[NeighbourCut | FreeCut], set[int]]:
+    """What cuts the board off, and the edges of its outline that are drawn over for it."""
+    board = model.boards[index]
+    names = [b.name for b in model.boards]
+    cuts: list[NeighbourCut | FreeCut] = []
+    edges: set[int] = set()
+    planes: list[tuple[np.ndarray, np.ndarray]] = []
+    for contact in model.contacts:
+        other = _sheet_of(contact, board.name)
+        if other is None:
+            continue
+        name, face, normal = other
+        _try_cut(board, np.array(contact.point), normal, NeighbourCut(names.index(name), face), cuts, edges, planes)
+    for point, normal in _own_planes(board):
+        if not any(abs(normal @ n) > 1 - PARALLEL and abs((point - p) @ n) < ON_PLANE for p, n in planes):
+            _try_cut(board, point, normal, FreeCut(point, normal), cuts, edges, planes)
+    return cuts, edges
+
+
+def _sheet_of(contact: Contact, name: str) -> tuple[str, str, np.ndarray] | None:
+    """The neighbour whose sheet the named board's cut face lies on, that face, and the normal towards the board."""
+    normal = np.array(contact.normal)
+    if contact.b == name and contact.face_b == "edge" and contact.face_a != "edge":
+        return contact.a, contact.face_a, normal
+    if contact.a == name and contact.face_a == "edge" and contact.face_b != "edge":
+        return contact.b, contact.face_b, -normal
+    return None
+
+
+def _own_planes(board: Board) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Point and inward normal, model frame, of the board's bevels."""
+    pose = model_from_board(board)
+    normals = [np.array(b.normal) / np.linalg.norm(b.normal) for b in board.bevels]
+    return [
+        (transform_points(pose, b.point), -transform_vectors(pose, n))
+        for b, n in zip(board.bevels, normals, strict=True)
+    ]
+
+
+def _try_cut(
+    board: Board,
+    point: np.ndarray,
+    normal: np.ndarray,
+    cut: NeighbourCut | FreeCut,
+    cuts: list,
+    edges: set[int],
+    planes: list,
+) -> None:
+    """Take the cut if the board ends on that plane along a straight edge, and no part of the board lies beyond it."""
+    found = _edges_on(board, point, normal)
+    if found and _all_ahead(board, point, normal, found):
+        cuts.append(cut)
+        edges |= found
+        planes.append((point, normal))
+
+
+def _edges_on(board: Board, point: np.ndarray, normal: np.ndarray) -> set[int]:
+    """Straight edges of the outline that the plane runs along, within the thickness."""
+    pose = model_from_board(board)
+    n = pose[:3, :3].T @ normal
+    offset = n @ (pose[:3, :3].T @ (point - pose[:3, 3]))
+    found = set()
+    for k, edge in enumerate(board.cut_path.outer.edges):
+        if not isinstance(edge, Line):
+            continue
+        along = edge_tangents(edge, np.zeros(1))[0]
+        outward = np.array([along[1], -along[0]])
+        heights = np.array([n[:2] @ edge.start, n[:2] @ edge.start + n[2] * board.thickness.value]) - offset
+        reached = heights.min() <= ON_PLANE and heights.max() >= -ON_PLANE
+        if abs(n[:2] @ along) < PARALLEL and -(n[:2] @ outward) > 0.2 and reached:
+            found.add(k)
+    return found
+
+
+def _all_ahead(board: Board, point: np.ndarray, normal: np.ndarray, found: set[int]) -> bool:
+    """Whether only what a bevel takes off lies behind the plane, so that it may cut the whole board."""
+    edges = board.cut_path.outer.edges
+    beside = {(k + step) % len(edges) for k in found for step in (-1, 0, 1)}
+    rest = [sample_edge(edge) for k, edge in enumerate(edges) if k not in beside]
+    if not rest:
+        return True
+    pose, flat = model_from_board(board), np.concatenate(rest)
+    solid = np.concatenate([np.column_stack([flat, np.full(len(flat), z)]) for z in (0.0, board.thickness.value)])
+    return bool(((transform_points(pose, solid) - point) @ normal).min() >= -ON_PLANE)
+
+
+def _overdrawn(loop: Loop, over: set[int]) -> Loop:
+    """The outline with some straight edges moved out by OVERDRAW; curves beside them are run on straight."""
+    if not over:
+        return loop
+    count = len(loop.edges)
+    starts = [_joint(loop, (k - 1) % count, k, over) for k in range(count)]
+    edges: list[Edge] = []
+    for k, edge in enumerate(loop.edges):
+        (_, begin), (end, _) = starts[k], starts[(k + 1) % count]
+        straight = isinstance(edge, Line)
+        points = (begin, end) if straight else (begin, edge.start)
+        edges.append(Line(start=points[0], end=points[1]))
+        edges += [] if straight else [edge, Line(start=edge.end, end=end)]
+        edges.append(Line(start=end, end=starts[(k + 1) % count][1]))
+    return Loop(edges=tuple(e for e in edges if edge_length(e) > ON_PLANE))
+
+
+def _joint(loop: Loop, before: int, after: int, over: set[int]) -> tuple[tuple, tuple]:
+    """Where the edge before ends and the edge after starts once some edges are moved out."""
+    corner = np.array(edge_start(loop.edges[after]))
+    if before not in over and after not in over:
+        return tuple(corner), tuple(corner)
+    u = edge_tangents(loop.edges[before], np.ones(1))[0]
+    v = edge_tangents(loop.edges[after], np.zeros(1))[0]
+    normals = np.array([[u[1], -u[0]], [v[1], -v[0]]])
+    if abs(np.linalg.det(normals)) < 0.05:  # nearly straight on: step out square to the edge
+        out = corner + OVERDRAW * normals[0 if before in over else 1]
+        return (tuple(out) if before in over else tuple(corner)), (tuple(out) if after in over else tuple(corner))
+    out = corner + np.linalg.solve(normals, [OVERDRAW * (k in over) for k in (before, after)])
+    return tuple(map(float, out)), tuple(map(float, out))

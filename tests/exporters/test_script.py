@@ -1,0 +1,90 @@
+"""The build123d program: the same solids, and an assembly that still fits after its dimensions were changed."""
+
+import subprocess
+import sys
+
+import pytest
+
+from kerfwright.errors import ExportError
+from kerfwright.model import Model
+from kerfwright.solid import assembly_solids
+from kerfwright_exporters import ExportOptions
+from kerfwright_exporters.script import export, identifiers
+from scripted import dimensions, interference, problems, run, typed_contacts
+from simple import board, rectangle, stool
+from truths import AVAILABLE, truth_model
+
+truths = pytest.mark.skipif(not AVAILABLE, reason="the captures with truth are not on this machine")
+
+
+def program(model: Model, folder) -> str:
+    return export(model, folder, ExportOptions())[0].read_text()
+
+
+def assert_same(solids: dict, model: Model) -> None:
+    for name, expected in assembly_solids(model):
+        assert solids[name].volume == pytest.approx(expected.volume, rel=1e-9)
+        assert (solids[name].center() - expected.center()).length < 1e-6
+
+
+@truths
+@pytest.mark.parametrize("name", AVAILABLE)
+def test_running_it_gives_the_same_solids(name, tmp_path):
+    assert_same(run(program(truth_model(name), tmp_path))[0], truth_model(name))
+
+
+@truths
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("bookshelf", {"WIDTH": 704.0}),
+        ("nightstand", {"STOCK_18": 20.0, "HEIGHT": 468.0}),
+        ("stool", {"DEPTH": 261.0, "STOCK_18": 20.0}),
+        ("tilted_stool", {"WIDTH": 480.0, "STOCK_18": 16.0}),
+    ],
+)
+def test_changed_dimensions_keep_contacts_and_validity(name, changes, tmp_path):
+    assert problems(program(truth_model(name), tmp_path), **changes) == []
+
+
+def test_what_lies_on_a_contact_follows_its_neighbour(tmp_path):
+    source = program(stool(), tmp_path)
+    assert dimensions(source) == {"WIDTH": 400.0, "DEPTH": 300.0, "HEIGHT": 398.0, "STOCK_18": 18.0}
+    solids, _ = run(source, HEIGHT=450.0, STOCK_18=21.0)
+    assert pytest.approx(450 - 21, abs=1e-9) == solids["leg left"].bounding_box().max.Z
+    assert solids["leg left"].volume == pytest.approx(21 * 300 * (450 - 21))
+    solids, normals = run(source, TOP_LENGTH=500.0)
+    assert pytest.approx(500) == solids["top"].bounding_box().size.X
+    assert typed_contacts(solids, normals) == {
+        ("top", "leg left"): ("sheet", "cut"),
+        ("top", "leg right"): ("sheet", "cut"),
+    }
+    assert interference(solids) == 0
+
+
+def test_it_runs_by_itself_without_kerfwright(tmp_path):
+    (path,) = export(stool(), tmp_path, ExportOptions())
+    source = path.read_text()
+    assert "import kerfwright" not in source and "from kerfwright" not in source
+    subprocess.run([sys.executable, path.name], cwd=tmp_path, check=True, capture_output=True)
+    from build123d import import_step
+
+    root = import_step(str(tmp_path / "model_from_script.step"))
+    assert [child.label for child in root.children] == ["top", "leg_left", "leg_right"]
+    assert_same({n: c for (n, _), c in zip(assembly_solids(stool()), root.children, strict=True)}, stool())
+
+
+def test_names_become_identifiers():
+    names = ["line", "2nd shelf", "class", "Leg", "leg_", "a.b"]
+    found = identifiers(Model(boards=tuple(board(rectangle(50, 40), n) for n in names)))
+    assert found == ["board_line", "board_2nd_shelf", "board_class", "leg", "leg2", "a_b"]
+    assert all(n.isidentifier() for n in found)
+
+
+def test_same_bytes_and_stamp(tmp_path):
+    (tmp_path / "b").mkdir()
+    assert program(stool(), tmp_path) == program(stool(), tmp_path / "b")
+    stamped = export(stool(), tmp_path, ExportOptions(unverified=True))[0].read_text()
+    assert "NOT VERIFIED" in stamped.splitlines()[0]
+    with pytest.raises(ExportError, match="at least one board"):
+        export(Model(), tmp_path, ExportOptions())
