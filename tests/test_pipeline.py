@@ -29,9 +29,8 @@ def finding(code: str) -> Finding:
 
 def merged(origin: str = "assumed"):
     parts = Parts(sheets=(), primitives=(), noise=0.1, notes=("one plane ignored",))
-    assembly = SimpleNamespace(findings=(finding("K200"),))
-    refined = SimpleNamespace(boards=(), contacts=(), findings=(finding("K300"),))
-    return pipeline._model(refined, assembly, parts, capture(origin), ReconstructOptions(seed=3))
+    refined = SimpleNamespace(boards=(), contacts=(), findings=(finding("K200"), finding("K300")))
+    return pipeline._model(refined, parts, capture(origin), ReconstructOptions(seed=3))
 
 
 def test_stages_run_in_order_and_get_what_they_need():

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from kerfwright.capture.types import Capture
     from kerfwright.identify.types import Parts
     from kerfwright.model import Finding, Model
+    from kerfwright.refine import Refined
 
 __all__ = ["STAGES", "ReconstructOptions", "Reconstruction", "Stage", "reconstruct", "run_stages", "stage_cache"]
 
@@ -130,16 +131,16 @@ def _assemble(parts: Parts, capture: Capture, options: ReconstructOptions) -> As
     return assemble(parts, capture, AssembleOptions())
 
 
-def _refine(assembly: Assembly, parts: Parts, capture: Capture, options: ReconstructOptions) -> Any:
+def _refine(assembly: Assembly, parts: Parts, capture: Capture, options: ReconstructOptions) -> Refined:
     from kerfwright.refine import RefineOptions, refine
 
     return refine(assembly, parts, capture, RefineOptions(seed=options.seed))
 
 
-def _check(refined: Any, assembly: Assembly, parts: Parts, capture: Capture, options: ReconstructOptions) -> Model:
+def _check(refined: Refined, parts: Parts, capture: Capture, options: ReconstructOptions) -> Model:
     from kerfwright.solid import CheckOptions, check
 
-    model = _model(refined, assembly, parts, capture, options)
+    model = _model(refined, parts, capture, options)
     return model.model_copy(update={"findings": (*model.findings, *check(model, CheckOptions()))})
 
 
@@ -148,12 +149,12 @@ STAGES: tuple[Stage, ...] = (
     Stage("identify", "Finding boards in the cloud", ("capture",), _identify, 0.3),
     Stage("assemble", "Finding how the boards meet", ("identify", "capture"), _assemble, 0.1),
     Stage("refine", "Tracing cut paths in the photographs", ("assemble", "identify", "capture"), _refine, 0.35),
-    Stage("check", "Building solids and checking them", ("refine", "assemble", "identify", "capture"), _check, 0.13),
+    Stage("check", "Building solids and checking them", ("refine", "identify", "capture"), _check, 0.13),
 )
 AFTERWARDS = {"write": 0.1}  # writing is no stage, but takes its part of the time
 
 
-def _model(refined: Any, assembly: Assembly, parts: Parts, capture: Capture, options: ReconstructOptions) -> Model:
+def _model(refined: Refined, parts: Parts, capture: Capture, options: ReconstructOptions) -> Model:
     """Gather what the stages found, their findings in the stages' order."""
     from dataclasses import asdict
 
@@ -166,7 +167,7 @@ def _model(refined: Any, assembly: Assembly, parts: Parts, capture: Capture, opt
     notes = [_remark("K001", text) for text in capture.notes] + [_remark("K002", text) for text in parts.notes]
     return Model(
         name=capture.name, boards=refined.boards, contacts=refined.contacts, scale=capture.scale, provenance=provenance,
-        findings=(*_scale_finding(capture), *notes, *assembly.findings, *refined.findings),
+        findings=(*_scale_finding(capture), *notes, *refined.findings),
         capture_from_model=tuple(tuple(float(x) for x in row) for row in capture.capture_from_world),
     )
 

@@ -69,21 +69,21 @@ def survey(capture: Capture) -> Survey:
 
 def _findings(figures: dict, capture: Capture) -> Iterator[Finding]:
     if figures["images"] < FEW_PHOTOGRAPHS:
-        yield _warn("K010", f"{figures['images']} photographs are few", "take 20 to 40, all round and from above")
+        yield _warn("K020", f"{figures['images']} photographs are few", "take 20 to 40, all round and from above")
     if figures["widest_gap_deg"] > WIDE_GAP:
         yield _warn(
-            "K011", f"{figures['widest_gap_deg']:.0f} degrees round the object without a photograph",
+            "K021", f"{figures['widest_gap_deg']:.0f} degrees round the object without a photograph",
             "photograph that side, or expect its boards to be inferred", figures["widest_gap_deg"],
         )
     across = max(figures["extent_mm"]) / figures["pixel_mm"] if figures["pixel_mm"] else 0.0
     if across < FEW_PIXELS:
         message = f"the object is only {across:.0f} pixels large"
-        yield _warn("K012", message, "go nearer, or keep full resolution", across)
+        yield _warn("K022", message, "go nearer, or keep full resolution", across)
     if figures["points"] < FEW_POINTS:
-        yield _warn("K013", f"{figures['points']} points are few", "make the dense cloud, not the sparse one")
+        yield _warn("K023", f"{figures['points']} points are few", "make the dense cloud, not the sparse one")
     if figures["plain_share"] > PLAIN_SHARE:
         yield _warn(
-            "K014", f"{100 * figures['plain_share']:.0f} % of the surface shows no texture above the noise",
+            "K024", f"{100 * figures['plain_share']:.0f} % of the surface shows no texture above the noise",
             "painted or glossy boards come out rough: stick on tape, or photograph in better light",
             figures["plain_share"],
         )
