@@ -10,6 +10,7 @@ from kerfwright.capture.types import Cloud
 
 __all__ = ["Floor", "find_floor"]
 
+ROUGH_POINTS = 60_000  # enough to find the floor; all points then fit it
 COLUMNS = 48  # a side of the grid in which the lowest points are looked for
 MIN_UPWARD = 0.5  # cosine of the largest angle between a floor point's normal and up: the tilt that is put right, and noise
 TRIALS = 500  # planes through three lowest points; with a fifth of them on the floor one in 125 hits
@@ -42,13 +43,16 @@ def find_floor(cloud: Cloud, centres: np.ndarray, generator: np.random.Generator
     cloud : in a frame where +z is roughly up, any unit
     centres : centres of the views, (M, 3); the floor lies below most of them
     """
-    lowest = _lowest_in_columns(cloud)
+    thin = cloud.select(slice(None, None, max(1, len(cloud) // ROUGH_POINTS)))
+    lowest = _lowest_in_columns(thin)
     if len(lowest) < 3:
         return None
-    size = float(np.ptp(np.percentile(cloud.points, (1, 99), axis=0), axis=0).max())
-    trial = _best_trial(cloud.points[lowest], ROUGH * size, generator)
-    floor = None if trial is None else _refined(cloud, *trial, ROUGH * size)
-    return floor if floor is not None and _is_floor(floor, cloud, centres) else None
+    size = float(np.ptp(np.percentile(thin.points, (1, 99), axis=0), axis=0).max())
+    trial = _best_trial(thin.points[lowest], ROUGH * size, generator)
+    floor = None if trial is None else _refined(thin, *trial, ROUGH * size)
+    if floor is None or not _is_floor(floor, thin, centres):
+        return None
+    return _refined(cloud, floor.normal, floor.offset, 8 * floor.noise, rounds=2)
 
 
 def _lowest_in_columns(cloud: Cloud) -> np.ndarray:
@@ -90,7 +94,7 @@ def _refined(cloud: Cloud, normal: np.ndarray, offset: float, tolerance: float, 
         if len(on) < 3:
             return None
         centre = cloud.points[on].mean(axis=0)
-        _, _, axes = np.linalg.svd(np.cov((cloud.points[on] - centre).T))
+        _, _, axes = np.linalg.svd(np.cov((cloud.points[on] - centre).T), hermitian=True)
         normal = axes[2] * np.sign(axes[2] @ normal)
         offset = float(normal @ centre)
         noise = 1.4826 * float(np.median(np.abs(cloud.points[on] @ normal - offset)))

@@ -12,6 +12,7 @@ import numpy as np
 from kerfwright.capture.crop import Cropped, above_floor, crop_to_object, focus
 from kerfwright.capture.floor import Floor, find_floor
 from kerfwright.capture.frame import moved, rotation_between, similarity
+from kerfwright.capture.photo_floor import floor_in_photos
 from kerfwright.capture.types import Capture
 from kerfwright.capture.yaw import upright_turn
 from kerfwright.errors import CaptureError
@@ -30,11 +31,13 @@ class PrepareOptions:
     ----------
     crop : leave out the floor, other objects and strays.
     ground : height of the floor in capture units along the up axis, instead of looking for it; nothing is levelled then.
+    photos : look for the floor in the photographs where the cloud has none; otherwise the object's lowest points stand on it.
     seed : of the search for the floor.
     """
 
     crop: bool = True
     ground: float | None = None
+    photos: bool = True
     seed: int = 0
 
 
@@ -57,7 +60,8 @@ def prepare(capture: Capture, options: PrepareOptions | None = None) -> Capture:
     capture, floor = _levelled(capture, options)
     if options.crop:
         capture = _cropped(capture, floor)
-    ground = floor.offset if floor else robust_lowest(capture.cloud.points[:, 2])
+    ground, notes = (floor.offset, ()) if floor else _ground(capture, options)
+    capture = replace(capture, notes=(*capture.notes, *notes))
     capture = moved(capture, similarity(1.0, upright_turn(capture.cloud), np.zeros(3)))
     low, high = np.percentile(capture.cloud.points[:, :2], (0.1, 99.9), axis=0)
     scale = capture.scale.millimetres_per_unit
@@ -91,6 +95,18 @@ def _cropped(capture: Capture, floor: Floor | None) -> Capture:
         raise CaptureError(f"{capture.name}: points above the floor: {len(cloud)}: at least {FEWEST_POINTS} are needed: "
                            "check --up and --ground")
     return replace(capture, cloud=cloud, notes=(*notes, *cropped.notes))
+
+
+def _ground(capture: Capture, options: PrepareOptions) -> tuple[float, tuple[str, ...]]:
+    """Height of a floor that is not in the cloud: from the photographs, or where the object begins."""
+    cloud = capture.cloud
+    lowest = robust_lowest(cloud.points[:, 2])
+    found = floor_in_photos(capture.views, cloud, lowest) if options.photos else None
+    if found is None:
+        return lowest, ("no floor was found: the lowest points of the object are taken to stand on it",)
+    below = 100 * (lowest - found.height) / cloud.diameter
+    return found.height, (f"the floor is not in the cloud; {found.views} photographs show it {below:.2f} % of the object's size "
+                          "below its lowest points",)
 
 
 def robust_lowest(heights: np.ndarray) -> float:

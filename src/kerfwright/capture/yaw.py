@@ -10,6 +10,9 @@ __all__ = ["dominant_yaw", "upright_turn"]
 
 UPRIGHT = 0.2  # sine of the largest angle between a normal and the horizontal
 BINS = 180  # of half a degree over a quarter turn
+FACING = np.cos(np.radians(15))  # of normals of a face along x or y
+LAYERS = (0.012, 0.008, 0.006, 0.006)  # of the object's size: the thickness of a layer about a face, thinner at each round
+MOST_LAYERS = 12
 WINDOWS = np.radians([4.0, 2.0, 1.0, 1.0])  # about the peak, narrower at each round
 
 
@@ -28,10 +31,51 @@ def dominant_yaw(normals: np.ndarray) -> float | None:
     return yaw % (np.pi / 2)
 
 
+def straightened(cloud: Cloud, yaw: float) -> float:
+    """The angle again, from where points lie instead of their normals, which stereo bends near edges.
+
+    With an angle e missing, a face along x has its points at x = c - e y, one along y at y = c + e x.
+    """
+    for width in LAYERS:
+        turn = _about_z(-yaw)[:2, :2]
+        xy, facing = cloud.points[:, :2] @ turn.T, np.abs(cloud.normals[:, :2] @ turn.T)
+        parts = [_layer_sums(xy[facing[:, k] > FACING, k], sign * xy[facing[:, k] > FACING, 1 - k], width * cloud.diameter)
+                 for k, sign in ((0, -1.0), (1, 1.0))]
+        product, square = np.sum(parts, axis=0)
+        yaw += float(product / square) if square > 0 else 0.0
+    return yaw
+
+
+def _layer_sums(offset: np.ndarray, place: np.ndarray, width: float) -> np.ndarray:
+    """Sums of offset times place and of place squared, about their means, over the densest layers of a width."""
+    sums = np.zeros(2)
+    for low in _densest(offset, width):
+        inside = (offset >= low) & (offset < low + width)
+        along = place[inside] - place[inside].mean()
+        sums += along @ (offset[inside] - offset[inside].mean()), along @ along
+    return sums
+
+
+def _densest(offset: np.ndarray, width: float) -> list[float]:
+    """Lower ends of up to MOST_LAYERS layers that do not overlap, the densest first."""
+    if not len(offset):
+        return []
+    step, start = width / 8, float(offset.min())
+    counts = np.convolve(np.bincount(((offset - start) / step).astype(int)), np.ones(8, int))[7:]  # of eight bins from each on
+    found = []
+    for _ in range(MOST_LAYERS):
+        best = int(counts.argmax())
+        if counts[best] < 0.01 * len(offset) or counts[best] <= 0:
+            break
+        found.append(start + best * step)
+        counts[max(0, best - 8) : best + 9] = 0
+    return found
+
+
 def upright_turn(cloud: Cloud) -> np.ndarray:
     """3x3 turn about z: faces along x and y, the longer side along x, the side with more points towards +x."""
     yaw = dominant_yaw(cloud.normals)
-    turn = _about_z(-(yaw or 0.0))
+    turn = np.eye(3) if yaw is None else _about_z(-straightened(cloud, yaw))
     sides = np.ptp(np.percentile(cloud.points[:, :2] @ turn[:2, :2].T, (0.5, 99.5), axis=0), axis=0)
     if sides[1] > sides[0]:
         turn = _about_z(-np.pi / 2) @ turn
