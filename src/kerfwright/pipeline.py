@@ -12,6 +12,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from kerfwright import __version__
 from kerfwright.cache import NO_CACHE, StageCache, folder_hash, program_hash
 from kerfwright.output import OutputFolder
@@ -25,6 +27,9 @@ if TYPE_CHECKING:
     from kerfwright.refine import Refined
 
 __all__ = ["STAGES", "ReconstructOptions", "Reconstruction", "Stage", "reconstruct", "run_stages", "stage_cache"]
+
+
+WORKING_SIZE = 500.0  # units that the object's largest side has inside the stages; their lengths are millimetres at that size
 
 
 @dataclass(frozen=True)
@@ -116,7 +121,17 @@ def _capture(path: Path, options: ReconstructOptions) -> Capture:
     from kerfwright.capture import PrepareOptions, open_capture, prepare
 
     opened = open_capture(path, up=options.up, millimetres_per_unit=options.millimetres_per_unit)
-    return prepare(opened, PrepareOptions())
+    return _in_working_units(prepare(opened, PrepareOptions()))
+
+
+def _in_working_units(capture: Capture) -> Capture:
+    """The capture resized so that the object is WORKING_SIZE long: an assumed scale must not set a tolerance.
+
+    What limits every stage, noise and pixels, grows with the object that fills the photographs.
+    """
+    from kerfwright.capture.frame import moved, similarity
+
+    return moved(capture, similarity(WORKING_SIZE / capture.cloud.diameter, np.eye(3), np.zeros(3)))
 
 
 def _identify(capture: Capture, options: ReconstructOptions) -> Parts:
@@ -159,17 +174,30 @@ def _model(refined: Refined, parts: Parts, capture: Capture, options: Reconstruc
     from dataclasses import asdict
 
     from kerfwright.model import Model, Provenance
+    from kerfwright.model.frames import rows
+    from kerfwright.model.resize import resized_board, resized_contact
 
+    world_from_model = _world_from_model(capture)
+    model_from_world = np.linalg.inv(world_from_model)
     provenance = Provenance(
         version=__version__, capture=capture.name, images=len(capture.views), points=len(capture.cloud),
         seed=options.seed, options=asdict(options),
     )
     notes = [_remark("K001", text) for text in capture.notes] + [_remark("K002", text) for text in parts.notes]
     return Model(
-        name=capture.name, boards=refined.boards, contacts=refined.contacts, scale=capture.scale, provenance=provenance,
+        name=capture.name, scale=capture.scale, provenance=provenance,
+        boards=tuple(resized_board(b, model_from_world) for b in refined.boards),
+        contacts=tuple(resized_contact(c, model_from_world) for c in refined.contacts),
         findings=(*_scale_finding(capture), *notes, *refined.findings),
-        capture_from_model=tuple(tuple(float(x) for x in row) for row in capture.capture_from_world),
+        capture_from_model=rows(capture.capture_from_world @ world_from_model),
     )
+
+
+def _world_from_model(capture: Capture) -> np.ndarray:
+    """4x4 from the model's millimetres to the working units of the stages."""
+    units_of_capture = float(np.cbrt(np.linalg.det(capture.capture_from_world[:3, :3])))
+    scale = 1.0 / (units_of_capture * capture.scale.millimetres_per_unit)
+    return np.diag([scale, scale, scale, 1.0])
 
 
 def _remark(code: str, text: str) -> Finding:

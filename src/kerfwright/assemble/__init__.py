@@ -19,12 +19,14 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     from kerfwright.assemble.constraints import constraint_segments
     from kerfwright.assemble.contacts import find_contacts, to_contact
     from kerfwright.assemble.stock import share_thickness
+    from kerfwright.identify.freespace import see_through
     from kerfwright.identify.photo_edges import Photos
 
     options = options or AssembleOptions()
     diameter = capture.cloud.diameter
     sheets, _ = align_sheets(parts.sheets, capture.cloud, options)
     sheets = share_thickness(sheets, diameter, options)
-    decided = find_contacts(sheets, diameter, Photos(capture), options)
+    free = see_through(capture, parts.spacing, max(5 * parts.noise, diameter / 150))
+    decided = find_contacts(sheets, capture.cloud, Photos(capture), free, options)
     contacts = tuple(to_contact(d, sheets) for d in decided)
     return Assembly(sheets, contacts, constraint_segments(sheets, decided, diameter, options))

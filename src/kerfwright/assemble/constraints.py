@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kerfwright.assemble.contacts import Decided
-from kerfwright.assemble.joints import Joint, Trace, columns, runs_of, face_plane, trace_of
+from kerfwright.assemble.joints import Joint, Trace, columns, face_plane, runs_of, trace_of
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.identify.types import Sheet

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from kerfwright.assemble.joints import Joint, end_on, face_plane
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.assemble.seams import Seam, look_for_end, look_for_seam
 from kerfwright.assemble.visibility import Obstacles
+from kerfwright.capture.types import Cloud
+from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.types import Sheet
 from kerfwright.model import Contact, ContactEvidence
@@ -33,29 +36,37 @@ class Decided:
 @dataclass(frozen=True, eq=False)
 class _Scene:
     sheets: tuple[Sheet, ...]
-    diameter: float
+    cloud: Cloud
     photos: Photos
     obstacles: Obstacles
+    free: FreeSpace
     options: AssembleOptions
+
+    @property
+    def diameter(self) -> float:
+        return self.cloud.diameter
 
     def mm(self, fraction: float) -> float:
         return fraction * self.diameter
 
 
-def find_contacts(sheets: tuple[Sheet, ...], diameter: float, photos: Photos, options: AssembleOptions) -> list[Decided]:
+def find_contacts(
+    sheets: tuple[Sheet, ...], cloud: Cloud, photos: Photos, free: FreeSpace, options: AssembleOptions
+) -> list[Decided]:
     """Every pair of boards that meets cut on sheet, with corners decided."""
-    scene = _Scene(sheets, diameter, photos, Obstacles(sheets, options.outline_error * diameter), options)
+    scene = _Scene(sheets, cloud, photos, Obstacles(sheets, options.outline_error * cloud.diameter), free, options)
     near, far = _all_joints(scene)
     found: list[Decided] = []
     for a in range(len(sheets)):
         for b in range(a + 1, len(sheets)):
-            pair = [near.get((a, b)), near.get((b, a))]
-            if all(pair):
-                found.append(_corner(scene, *pair))
-            elif any(pair):
-                found.append(Decided(pair[0] or pair[1], 1, None, ContactEvidence()))
+            keys = ((a, b), (b, a))
+            either = [near.get(key) or _unfinished(scene, far.get(key)) for key in keys]
+            if all(either) and any(key in near for key in keys):
+                found.append(_corner(scene, *either))
+            elif any(either):
+                found.append(Decided(either[0] or either[1], 1, None, ContactEvidence()))
             else:
-                seen = [d for key in ((a, b), (b, a)) if (d := _confirmed(scene, far.get(key)))]
+                seen = [d for key in keys if (d := _confirmed(scene, far.get(key)))]
                 found.extend(sorted(seen, key=lambda d: -d.evidence.seam_score)[:1])
     return _like_their_twins(scene, found)
 
@@ -76,8 +87,40 @@ def _all_joints(scene: _Scene) -> tuple[dict[tuple[int, int], Joint], dict[tuple
                 far[a, b] = joint
             else:
                 near[a, b] = joint
-    near = {key: j for key, j in near.items() if _is_contact(scene, j, near.get(key[::-1]))}
+    near = {key: j for key, j in near.items() if _is_contact(scene, j, near.get(key[::-1]) or far.get(key[::-1]))}
     return near, far
+
+
+def _end_is_seen(scene: _Scene, joint: Joint) -> bool:
+    """Whether cut-face points that look towards a show where b really ends: then it does not reach a."""
+    b = scene.sheets[joint.b]
+    if joint.gap < scene.mm(scene.options.end_offset) or not len(b.cut_idx):
+        return False
+    facing = scene.cloud.normals[b.cut_idx] @ b.world_from_board[:3, :2] @ -joint.trace.m > 0.7
+    places = b.to_board(scene.cloud.points[b.cut_idx[facing]])[:, :2]
+    if len(places) < 5:
+        return False
+    distance, _ = cKDTree(places).query(joint.ends)
+    return float((distance < scene.mm(scene.options.end_offset) * 2).mean()) > 0.5
+
+
+def _unfinished(scene: _Scene, joint: Joint | None) -> Joint | None:
+    """A far joint whose board just fades out: no cut face ends it, and nobody saw through the gap."""
+    if joint is None or joint.gap > scene.mm(scene.options.unseen_reach) or joint.length < scene.mm(scene.options.reach):
+        return None
+    if _end_is_seen(scene, joint) or _gap_is_free(scene, joint):
+        return None
+    return joint
+
+
+def _gap_is_free(scene: _Scene, joint: Joint) -> bool:
+    """Whether cameras saw through the place between b's outline and the plane."""
+    b = scene.sheets[joint.b]
+    inside, along = joint.trace.coordinates(joint.ends)
+    layers = [joint.trace.place(share * inside, along) for share in (0.2, 0.4, 0.6, 0.8)]
+    heights = b.thickness.value * np.array([0.3, 0.7])
+    places = np.concatenate([np.c_[xy, np.full(len(xy), z)] for xy in layers for z in heights])
+    return float((scene.free.votes(b.to_world(places)) >= 2).mean()) > 0.3
 
 
 def _is_contact(scene: _Scene, joint: Joint, reverse: Joint | None) -> bool:
@@ -85,7 +128,7 @@ def _is_contact(scene: _Scene, joint: Joint, reverse: Joint | None) -> bool:
 
     A board whose outline covers the other's thickness stops there only if its outer face shows a seam, or the other may stop instead.
     """
-    if joint.length < scene.mm(scene.options.reach):
+    if joint.length < scene.mm(scene.options.reach) or _end_is_seen(scene, joint):
         return False
     overlapping = joint.gap < -0.5 * scene.sheets[joint.a].thickness.value
     if overlapping and reverse is not None:
@@ -101,7 +144,7 @@ def _seam(scene: _Scene, joint: Joint, face: str) -> Seam:
 
 def _confirmed(scene: _Scene, joint: Joint | None) -> Decided | None:
     """A far joint that the photographs confirm: the first strong edge beyond the outline is at the plane."""
-    if joint is None or joint.length < scene.mm(scene.options.reach):
+    if joint is None or joint.length < scene.mm(scene.options.reach) or _end_is_seen(scene, joint) or _gap_is_free(scene, joint):
         return None
     end = look_for_end(scene.sheets, joint, scene.photos, scene.obstacles, scene.mm(1 / 300))
     if end is None or end.views < 3 or end.score < scene.options.end_score:

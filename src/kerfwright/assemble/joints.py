@@ -64,7 +64,7 @@ class Joint:
     trace: Trace  # in b
     intervals: tuple[tuple[float, float], ...]  # along the trace
     gap: float  # median distance of b's rough outline from the plane, mm; negative where it overlaps a
-    spread: float
+    ends: np.ndarray  # (K, 2) where b's rough outline ends, b's plane
 
     @property
     def length(self) -> float:
@@ -101,15 +101,18 @@ def _end_on_face(
         return None
     hidden = one.thickness.value / trace.sine + slack
     ends = (first > -hidden) & (first < reach) & (last > reach / 2)
-    ends &= _has_wood(one, other, trace, along, reach)
+    ends &= _has_wood(one, other, trace, along, slack)
+    if not ends.any():
+        return None
+    ends &= first < 2 * max(float(np.median(first[ends])), 0.0) + slack  # deeper columns end beside a, not before it
     intervals = runs_of(along, ends, step, shortest, joining=reach)
     if not intervals:
         return None
     inside = np.zeros(len(along), bool)
     for low, high in intervals:
         inside |= (along >= low) & (along <= high)
-    own = first[inside & ends]
-    return Joint(a, b, face, trace, intervals, float(np.median(own)), float(np.std(own)))
+    own = inside & ends
+    return Joint(a, b, face, trace, intervals, float(np.median(first[own])), trace.place(first[own], along[own]))
 
 
 def columns(region: Polygon, trace: Trace, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -19,8 +19,9 @@ class AssembleOptions:
     thickness_floor: float = 1 / 1500  # least standard error of a thickness: eased edges hide part of it
     ground_reach: float = 1 / 40  # a board that comes this near the floor stands on it
     outline_error: float = 1 / 60  # how far a rough outline may be off
-    far_reach: float = 1 / 8  # boards this near are connected when the photographs show the end at the plane
-    end_score: float = 2.4  # least edge strength that confirms a far end
+    unseen_reach: float = 1 / 8  # a board that fades out unseen this near another runs on to it
+    far_reach: float = 1 / 2  # ... and this near when the photographs show its end at the plane
+    end_score: float = 2.8  # least edge strength that confirms a far end
     end_offset: float = 1 / 200
     min_contact: float = 1 / 100  # shortest interface
     seam_images: bool = True

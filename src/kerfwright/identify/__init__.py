@@ -40,4 +40,4 @@ def identify(capture: Capture, options: IdentifyOptions | None = None) -> Parts:
         "candidates": len(slabs), "chosen": len(selection.chosen), "objective": selection.objective,
         "bound": selection.bound, "explained": selection.explained, "method": selection.method,
     }
-    return Parts(sheets, tuple(planes), around.noise, selection=figures)
+    return Parts(sheets, tuple(planes), around.noise, around.spacing, selection=figures)

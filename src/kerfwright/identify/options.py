@@ -21,6 +21,7 @@ class IdentifyOptions:
     max_thickness: float = 1 / 6
     sweep_step: float = 1 / 2000  # offsets at which photographs are read
     min_unseen_side: float = 1 / 20  # a board of unseen thickness is at least this wide over most of its area
+    min_hole_side: float = 1 / 40  # side of the smallest square that is kept as a hole
     opposite_degrees: float = 4.0  # opposite sheet planes are parallel within this
     cut_area_ratio: float = 5.0  # paper, Part Selection: cut surface over cut region area
     sample_voxel: float = 1 / 150  # spacing of the surface samples that selection covers

@@ -10,13 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from scipy.ndimage import binary_closing, gaussian_filter
+from scipy.ndimage import binary_closing, binary_opening, gaussian_filter
 from shapely.geometry import Polygon
 from skimage.measure import find_contours, label
+from skimage.morphology import disk
 
 __all__ = ["Raster", "occupancy", "polygons"]
 
 NEAR_SHARE = 0.35  # a cell is wood when its density is at least this share of the density round about
+VEIL_SHARE = 0.15  # ... and this share of the density of a face seen well
 
 
 @dataclass(frozen=True)
@@ -44,17 +46,20 @@ class Raster:
         return np.asarray(self.low) + (row_column[:, ::-1] + 0.5) * self.cell
 
 
-def occupancy(raster: Raster, xy: np.ndarray) -> np.ndarray:
-    """Where (N, 2) points lie densely, (rows, columns) bool."""
+def occupancy(raster: Raster, xy: np.ndarray, spacing: float) -> np.ndarray:
+    """Where (N, 2) points lie densely, (rows, columns) bool.
+
+    spacing: mm between points of a face seen well. Stereo spans dark openings with a thin veil of points: that is not wood.
+    """
     density = gaussian_filter(raster.counts(xy), 1.0)
     some = (density > 1e-3).astype(float)
     around = gaussian_filter(density, 6.0) / np.maximum(gaussian_filter(some, 6.0), 1e-6)
-    return density > np.maximum(NEAR_SHARE * around, 0.1)
+    return density > np.maximum(NEAR_SHARE * around, VEIL_SHARE * (raster.cell / spacing) ** 2)
 
 
 def polygons(raster: Raster, wood: np.ndarray, min_area: float, min_hole: float) -> list[Polygon]:
     """Connected pieces of a mask as polygons with holes, largest first; areas in mm2."""
-    wood = binary_closing(wood, iterations=1)
+    wood = binary_opening(binary_closing(wood, iterations=1), structure=disk(2))
     pieces = []
     numbered = label(wood, connectivity=1)
     for number in range(1, numbered.max() + 1):

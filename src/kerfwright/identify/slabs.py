@@ -166,6 +166,11 @@ class _Scene:
         return self.diameter / 400
 
     @property
+    def min_hole(self) -> float:
+        """Smaller gaps in a region are gaps in the cloud; whether a larger one is a hole in the wood the photographs tell."""
+        return (self.options.min_hole_side * self.diameter) ** 2
+
+    @property
     def cell(self) -> float:
         return max(1.5 * self.around.spacing, self.diameter / 400)
 
@@ -191,7 +196,7 @@ def _seeds(scene: _Scene, number: int) -> list[_Seed]:
     top = scene.coplanar(plane.normal, plane.centroid)
     own = (scene.capture.cloud.points[plane.point_idx] - plane.centroid) @ frame[:3, :3]
     raster = Raster.around(own[:, :2], scene.cell)
-    pieces = polygons(raster, occupancy(raster, own[:, :2]), scene.min_area, 4 * scene.cell**2)
+    pieces = polygons(raster, occupancy(raster, own[:, :2], scene.around.spacing), scene.min_area, scene.min_hole)
     return [(top, frame, piece) for piece in pieces]
 
 
@@ -222,46 +227,17 @@ def _slabs(
     wood = np.zeros(raster.shape, bool)
     for side in sides:
         if len(side):
-            wood |= occupancy(raster, side[:, :2])
+            wood |= occupancy(raster, side[:, :2], scene.around.spacing)
     board = frame.copy()
     board[:3, 3] = bottom_point
     slabs = []
-    for piece in polygons(raster, wood, scene.min_area, 4 * scene.cell**2):
+    for piece in polygons(raster, wood, scene.min_area, scene.min_hole):
         if piece.intersection(seed).area < 0.5 * seed.area:
             continue
-        piece = _fill_unseen_holes(scene, board, thickness.value, piece)
         slab = Slab(board, thickness, piece, top, bottom, _free_share(scene, board, thickness.value, piece))
         if slab.cut_ratio <= scene.options.cut_area_ratio and slab.free_share <= scene.options.max_free:
             slabs.append(slab)
     return slabs
-
-
-def _fill_unseen_holes(scene: _Scene, board: np.ndarray, thickness: float, piece: Polygon) -> Polygon:
-    """Close the holes that nothing proves: neither seen through nor lined by cut faces that face into them."""
-    kept = [ring for ring in piece.interiors if _hole_is_real(scene, board, thickness, Polygon(ring))]
-    return Polygon(piece.exterior, kept)
-
-
-def _hole_is_real(scene: _Scene, board: np.ndarray, thickness: float, hole: Polygon) -> bool:
-    inner = hole.buffer(-scene.cell)
-    if inner.is_empty:
-        return False
-    sites = _sites(inner, board, np.array([thickness / 2]), 200)
-    if (scene.free.votes(sites) >= 2).mean() > 0.5:
-        return True
-    cloud = scene.capture.cloud
-    x = (cloud.points - board[:3, 3]) @ board[:3, :3]
-    low, high = np.array(hole.bounds).reshape(2, 2)
-    margin = 2 * scene.cell
-    near = np.flatnonzero(((x[:, :2] > low - margin) & (x[:, :2] < high + margin)).all(axis=1) & (x[:, 2] > 0) & (x[:, 2] < thickness))
-    normal = scene.around.normals[near] @ board[:3, :3]
-    rim = near[np.abs(normal[:, 2]) < 0.5]
-    if not len(rim):
-        return False
-    inward = np.array(hole.centroid.coords[0]) - x[rim, :2]
-    facing = (scene.around.normals[rim] @ board[:3, :2] * inward).sum(axis=1) > 0
-    band = shapely.distance(hole.exterior, shapely.points(x[rim, :2])) < margin
-    return float((facing & band).sum()) * scene.around.spacing**2 > 0.3 * hole.length * thickness
 
 
 def _sites(region: Polygon, board: np.ndarray, heights: np.ndarray, count: int) -> np.ndarray:

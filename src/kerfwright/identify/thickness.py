@@ -16,7 +16,7 @@ from shapely.geometry import MultiPoint, Polygon
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.photo_edges import Photos, SweepResult, refine_peak, sweep_edge
 from kerfwright.identify.primitives import Neighbourhood
-from kerfwright.identify.rims import Rim, cut_points, outline_samples, trace_rim
+from kerfwright.identify.rims import Rim, cut_points, outline_samples
 from kerfwright.identify.types import Primitive
 
 __all__ = ["ThicknessHypothesis", "from_cut_faces", "from_opposite", "from_photos", "sharpened"]

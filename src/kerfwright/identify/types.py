@@ -62,5 +62,6 @@ class Parts:
     sheets: tuple[Sheet, ...]
     primitives: tuple[Primitive, ...]
     noise: float  # robust standard deviation of the cloud across its surface, mm
+    spacing: float = 1.0  # median distance to the third nearest point, mm
     notes: tuple[str, ...] = ()
     selection: dict | None = None  # objective, bound, gap, candidates: for the report

@@ -1,0 +1,28 @@
+"""Options and result of refinement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from kerfwright.model import Board, Contact, Finding
+
+__all__ = ["RefineOptions", "Refined"]
+
+
+@dataclass(frozen=True)
+class RefineOptions:
+    """What refinement may be told; lengths are fractions of the cloud's largest side D."""
+
+    use_images: bool = True  # false: cut paths come from the cloud alone
+    boundary_step: float = 1 / 450  # spacing of boundary points handed to curve fitting
+    rounds: int = 2  # assembly and outlines alternate at most so often
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """Finished boards, the contacts between them, and what was noticed."""
+
+    boards: tuple[Board, ...]
+    contacts: tuple[Contact, ...]
+    findings: tuple[Finding, ...] = ()
