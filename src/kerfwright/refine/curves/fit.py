@@ -14,6 +14,7 @@ from kerfwright.refine.curves.candidates import find_candidates
 from kerfwright.refine.curves.chain import Chain, best_chain, unit_price
 from kerfwright.refine.curves.options import CurveFit, CurveOptions, EdgeStatistics
 from kerfwright.refine.curves.path import check_path, full_circle, loop_of_shape
+from kerfwright.refine.curves.polish import polish
 from kerfwright.refine.curves.ranges import fit_circle
 from kerfwright.refine.curves.samples import Samples, resample
 from kerfwright.refine.curves.search import improve
@@ -67,7 +68,18 @@ def fit_curves(
     segments = [replace(s, start=np.asarray(s.start) - centre, end=np.asarray(s.end) - centre) for s in constraints]
     guides = guide_lines(segments)
     fits = [_fit_loop(_shifted(loop, -centre), guides, options) for loop in loops]
-    return _result(fits, loops, guides, centre)
+    fits, relations = _polished(fits, guides, options)
+    return _result(fits, loops, guides, centre, relations)
+
+
+def _polished(
+    fits: list[_LoopFit], guides: list[GuideLine], options: CurveOptions
+) -> tuple[list[_LoopFit], tuple[str, ...]]:
+    """All loops but full circles with their relations made exact."""
+    chains = [i for i, fit in enumerate(fits) if fit.fit is not None]
+    better, relations = polish([fits[i].fit for i in chains], [fits[i].samples for i in chains], guides, options)
+    swapped = dict(zip(chains, better, strict=True))
+    return [replace(fit, fit=swapped.get(i)) for i, fit in enumerate(fits)], relations
 
 
 def _shifted(loop: BoundaryLoop, by: np.ndarray) -> BoundaryLoop:
@@ -110,7 +122,11 @@ def _forced(runs: list[Run], samples: Samples) -> np.ndarray:
 
 
 def _result(
-    fits: list[_LoopFit], loops: Sequence[BoundaryLoop], guides: list[GuideLine], centre: np.ndarray
+    fits: list[_LoopFit],
+    loops: Sequence[BoundaryLoop],
+    guides: list[GuideLine],
+    centre: np.ndarray,
+    relations: tuple[str, ...],
 ) -> CurveFit:
     made = [_finish(fit, loop, guides, centre) for fit, loop in zip(fits, loops, strict=True)]
     path = CutPath(outer=made[0][0], holes=tuple(loop for loop, _ in made[1:]))
@@ -121,6 +137,7 @@ def _result(
         sum(fit.fit.chi2 if fit.fit else fit.circle[2] for fit in fits),
         sum(fit.samples.observations for fit in fits),
         tuple(statistics for _, statistics in made),
+        relations,
     )
 
 

@@ -16,7 +16,7 @@ from kerfwright.refine.curves.samples import Samples
 from kerfwright.refine.curves.shape import Shape, equations, feet, residuals
 from kerfwright.refine.curves.snap import GuideLine
 
-__all__ = ["Equations", "Fit", "distances", "solve"]
+__all__ = ["Equations", "Fit", "constrained_step", "distances", "normal_equations", "solve", "taken_stock"]
 
 ROBUST = 4.0  # standard errors at which an observation has lost three quarters of its weight (Geman-McClure)
 _RANK = 1e-9
@@ -71,14 +71,14 @@ def solve(
     """The best unknowns for the structure of `shape`; `extra` gives more equations than the structure's own."""
     both = _all_equations(guides, extra)
     damping, best = 1e-3, None
-    system = _system(shape, samples)
+    system = normal_equations(shape, samples)
     for _ in range(steps):
         value, jacobian = both(shape)
-        step, covariance = _step(*system[:2], value, jacobian, damping)
+        step, covariance = constrained_step(*system[:2], value, jacobian, damping)
         limit = 0.2 * samples.length / max(shape.count, 4)
         step *= min(1.0, limit / max(float(np.abs(step[: 2 * shape.count]).max()), 1e-12))
         trial = shape.moved(shape.unknowns + step)
-        trial_system = _system(trial, samples)
+        trial_system = normal_equations(trial, samples)
         merit = _merit(trial_system[2], both(trial)[0], samples)
         if best is None or merit <= best * (1 + 1e-9) + 1e-9:
             shape, system, damping = trial, trial_system, max(damping / 5, 1e-9)
@@ -108,7 +108,7 @@ def _merit(robust: float, violation: np.ndarray, samples: Samples) -> float:
     return robust + 1e3 * float(np.abs(violation).sum()) / max(float(np.median(samples.sigma)), 1e-6)
 
 
-def _system(shape: Shape, samples: Samples) -> tuple[np.ndarray, np.ndarray, float]:
+def normal_equations(shape: Shape, samples: Samples) -> tuple[np.ndarray, np.ndarray, float]:
     """Normal matrix and right side of the robust least squares, and the robust chi-square."""
     unknowns = len(shape.unknowns)
     normal, right, chi2 = np.zeros((unknowns, unknowns)), np.zeros(unknowns), 0.0
@@ -141,7 +141,7 @@ def _handles(shape: Shape, k: int, normal: np.ndarray, right: np.ndarray) -> Non
             right[columns[row + d]] += 0.25 / chord**2 * (target[d] - shape.unknowns[columns[row + d]])
 
 
-def _step(
+def constrained_step(
     normal: np.ndarray, right: np.ndarray, value: np.ndarray, jacobian: np.ndarray, damping: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Step that brings the equations to zero in first order and lowers the sum of squares, and the covariance."""
@@ -167,7 +167,11 @@ def _finished(shape: Shape, samples: Samples, both: Equations, covariance: np.nd
             break
         step = np.linalg.lstsq(jacobian, -value, rcond=_RANK)[0]
         shape = shape.moved(shape.unknowns + step)
-    value, _ = both(shape)
+    return taken_stock(shape, samples, covariance, float(np.abs(both(shape)[0]).max(initial=0.0)))
+
+
+def taken_stock(shape: Shape, samples: Samples, covariance: np.ndarray, violation: float = 0.0) -> Fit:
+    """The fit that a shape is: chi-square, distances, edges of the samples."""
     distance, edge = distances(shape, samples)
     ratio = 1 + (distance / (ROBUST * samples.sigma)) ** 2
     return Fit(
@@ -177,5 +181,5 @@ def _finished(shape: Shape, samples: Samples, both: Equations, covariance: np.nd
         distance,
         edge,
         covariance,
-        float(np.abs(value).max(initial=0.0)),
+        violation,
     )
