@@ -25,15 +25,18 @@ class Light:
     power: np.ndarray  # (W, 3) linear colours of what a window sends to a surface that faces it
     ambient: np.ndarray  # (3,)
     depth: float  # mm of free space in front of a point that give it the room's full light
+    bars: float | None  # mm from one bar of the windows' blinds to the next; none without blinds
 
 
-def draw_light(largest: float, rng: np.random.Generator) -> Light:
-    """Two windows, one stronger."""
+def draw_light(largest: float, bars: bool, rng: np.random.Generator) -> Light:
+    """Two windows, one stronger; with blinds, they are small enough for shadows with edges."""
     around = rng.uniform(0, 2 * np.pi) + np.array([0, rng.uniform(1.6, 3.0)])
     reach, height = 3.1 * largest, rng.uniform(1.5, 2.4, 2) * largest
     windows = np.column_stack([reach * np.cos(around), reach * np.sin(around), height])
     power = np.array([[1.0, 0.97, 0.92], [0.5, 0.5, 0.52]]) * rng.uniform(0.45, 0.75)
-    return Light(windows, 0.9 * largest, power, np.array([0.52, 0.52, 0.53]), 1.2 * largest)
+    size, ambient = (0.06, 0.35) if bars else (0.9, 0.52)
+    gap = rng.uniform(0.2, 0.4) * largest if bars else None
+    return Light(windows, size * largest, power, np.full(3, ambient), 1.2 * largest, gap)
 
 
 def irradiance(
@@ -67,13 +70,21 @@ def _windows(scene: RayScene, light: Light, x, normal, rng) -> np.ndarray:
     """One ray a point and window, somewhere into it."""
     total = np.zeros((len(x), 3), np.float32)
     for middle, power in zip(light.windows, light.power, strict=True):
-        toward = (middle + rng.uniform(-light.size, light.size, x.shape) - x).astype(np.float32)
-        toward /= _length(toward)
+        reach = (middle + rng.uniform(-light.size, light.size, x.shape) - x).astype(np.float32)
+        toward = reach / _length(reach)
         facing = np.einsum("ij,ij->i", toward, normal)
         ahead = np.flatnonzero(facing > 0)
-        lit = ahead[~scene.blocked(x[ahead], toward[ahead])]
+        if light.bars:
+            ahead = ahead[_between_bars(light.bars, x[ahead], toward[ahead])]
+        lit = ahead[~scene.blocked(x[ahead], reach[ahead], far=1.0)]  # no further: behind the window stands the wall
         total[lit] += facing[lit, None] * power.astype(np.float32)
     return total
+
+
+def _between_bars(gap: float, x: np.ndarray, toward: np.ndarray) -> np.ndarray:
+    """Which rays pass a blind that hangs a few gaps away; the bars slant, so that they cross boards at any angle."""
+    at = x + 3 * gap * toward
+    return (at @ np.array([0.55, 0.25, 0.8], np.float32)) % gap > 0.35 * gap
 
 
 def _length(v: np.ndarray) -> np.ndarray:

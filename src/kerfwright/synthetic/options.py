@@ -41,6 +41,7 @@ class ImageOptions:
     blur: float = 0.5  # px, lens and demosaicing
     quality: int = 92  # JPEG
     knots: float = 6.0  # a square metre and sheet side
+    bars: bool = False  # of a blind before the windows: shadows with straight edges
     floor_texels: int = 2048  # across the room's floor
     room_nodes: int = 160  # of the light map, across floor and walls
     light_rays: int = 48  # a node of the light map
@@ -105,6 +106,8 @@ PRESETS = {
     ),
     # dark or shiny wood and few pictures: twice the fringe, a third of the surface bare, tails three times as thick
     "rough": CaptureOptions(cloud=CloudOptions(noise=0.18, drift=0.25, tail=0.12, fringe=0.12, dropout=0.3)),
+    # straight shadows and many knots on wood of one colour: none of them is a seam
+    "shadows": CaptureOptions(images=ImageOptions(bars=True, knots=30.0)),
     # the surface sits too far out everywhere, as it did in two of the seven shared captures
     "biased": CaptureOptions(cloud=CloudOptions(bias=0.35)),
     # small and coarse, made in seconds: for trying the program out

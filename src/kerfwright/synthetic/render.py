@@ -11,7 +11,7 @@ from kerfwright.synthetic.stage import Stage
 
 __all__ = ["developed", "photograph"]
 
-GAIN = 1.6  # exposes light wood in the open to about 200 of 255
+GAIN = 1.3  # exposes light wood in the open to about 200 of 255
 GLOSS_POWER = 60  # exponent of the highlight's lobe: satin lacquer
 
 

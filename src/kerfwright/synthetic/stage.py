@@ -104,7 +104,7 @@ def build_stage(model: Model, options: ImageOptions, rng: np.random.Generator) -
     vertices, triangles, owner = _joined(meshes, quads)
     patches = _patches(meshes, quads, options.texels * largest)
     atlas = pack(patches)
-    scene, light = RayScene(vertices, triangles), draw_light(largest, rng)
+    scene, light = RayScene(vertices, triangles), draw_light(largest, options.bars, rng)
     radiance = np.zeros((*atlas.shape, 3), np.float32)
     _paint(radiance, atlas, _albedos(model, patches, quads, options, rng))
     _shine(radiance, atlas, _Bake(scene, [RayScene(*m) for m in meshes], light, options, rng))
