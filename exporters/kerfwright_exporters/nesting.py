@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["NestOptions", "Place", "nest"]
 
+TRIALS_A_BOARD = 12  # few boards have few orders worth trying
 WARMTH = 0.02  # of the cost: how much worse a layout the search takes at its start
 
 
@@ -35,8 +36,8 @@ class NestOptions:
     width: float
     spacing: float  # least distance of two boards
     turns: tuple[int, ...] = (0, 90, 180, 270)  # degrees that a board may be turned by
-    layouts: int = 400  # orders tried on the coarse raster; one takes a few milliseconds for 30 boards
-    finalists: int = 12  # best orders laid again on the fine raster
+    layouts: int = 400  # orders tried at most on the coarse raster; one takes some 10 milliseconds for 30 boards
+    finalists: int = 6  # best orders laid again on the fine raster
     coarse: int = 200  # cells across the width: 6 mm on a sheet of 1220
     fine: int = 600  # 2 mm; finer is slower and hardly tighter
     seed: int = 0
@@ -71,8 +72,9 @@ def _search(raster: _Raster, outlines: list[Polygon], options: NestOptions) -> l
     rng = np.random.default_rng(options.seed)
     seen = [(raster.cost(order), order) for order in _starts(outlines)]
     current, order = min(seen, key=lambda entry: entry[0])
-    for trial in range(options.layouts if len(outlines) > 1 else 0):
-        warmth = WARMTH * current * (1 - trial / options.layouts)
+    trials = min(options.layouts, TRIALS_A_BOARD * len(outlines)) if len(outlines) > 1 else 0
+    for trial in range(trials):
+        warmth = WARMTH * current * (1 - trial / trials)
         candidate = _neighbour(order, rng)
         found = raster.cost(candidate)
         if found <= current or rng.random() < np.exp((current - found) / warmth):

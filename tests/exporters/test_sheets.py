@@ -44,7 +44,7 @@ def laid(shapes, places):
 @pytest.mark.parametrize(("count", "seed"), [(24, 1), (40, 2)])
 def test_boards_keep_their_distance_on_few_sheets(count, seed):
     shapes = outlines(count, seed)
-    options = NestOptions(1500, 800, 6.0, layouts=60)
+    options = NestOptions(1500, 800, 6.0, layouts=20, finalists=3, coarse=100, fine=200)
     places = nest(shapes, options)
     room = shapely.box(-1e-6, -1e-6, 1500 + 1e-6, 800 + 1e-6)
     put = laid(shapes, places)
