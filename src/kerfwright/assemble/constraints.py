@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from kerfwright.assemble.contacts import Decided
@@ -20,8 +22,9 @@ def constraint_segments(
 ) -> tuple[tuple[ConstraintSegment, ...], ...]:
     """Per board its constraint segments: contacts first, then corners, then the ground."""
     out: list[list[ConstraintSegment]] = [[] for _ in sheets]
+    traces = _pointed(sheets, decided)
     for number, d in enumerate(decided):
-        out[d.joint.b] += _segments(d.joint.trace, d.joint.intervals, "contact", number)
+        out[d.joint.b] += _segments(traces[number], d.joint.intervals, "contact", number)
         if d.kind == 2:
             trace = _outer_trace(sheets, d)
             if trace is not None:
@@ -30,6 +33,22 @@ def constraint_segments(
         contacts = [d.joint for d in decided if d.joint.b == k]
         out[k] += _ground(sheet, contacts, diameter, options)
     return tuple(tuple(segments) for segments in out)
+
+
+def _pointed(sheets: tuple[Sheet, ...], decided: list[Decided]) -> list[Trace]:
+    """The contacts' traces; where two slanted planes end a board in a point, both are moved to the line of the point."""
+    traces = [d.joint.trace for d in decided]
+    for i, one in enumerate(decided):
+        for j in range(i + 1, len(decided)):
+            a, b = one.joint.trace, decided[j].joint.trace
+            if one.joint.b != decided[j].joint.b or a.m @ b.m < 0.999 or a.slope * b.slope >= 0:
+                continue
+            base = [t.offset - t.slope * t.depth for t in (a, b)]
+            height = (base[1] - base[0]) / (a.slope - b.slope)
+            if 0 < height < sheets[one.joint.b].thickness.value:
+                offset = base[0] + a.slope * height
+                traces[i], traces[j] = (replace(t, offset=offset, depth=height) for t in (a, b))
+    return traces
 
 
 def _segments(trace: Trace, intervals: tuple[tuple[float, float], ...], origin: str, contact: int | None) -> list[ConstraintSegment]:

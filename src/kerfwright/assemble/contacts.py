@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from kerfwright.assemble.joints import Joint, end_on, face_plane
+from kerfwright.assemble.joints import Joint, Search, end_on, face_plane
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.assemble.seams import Seam, look_for_end, look_for_seam
 from kerfwright.assemble.visibility import Obstacles
@@ -49,19 +49,26 @@ class _Scene:
     def mm(self, fraction: float) -> float:
         return fraction * self.diameter
 
+    def search(self, cover: float) -> Search:
+        """Where joints are looked for when a's wood may go on so far (a fraction of D) beyond its outline."""
+        o = self.options
+        return Search(self.mm(o.far_reach), self.mm(o.outline_error), self.mm(cover), self.mm(1 / 200), self.mm(o.min_contact))
+
 
 def find_contacts(
     sheets: tuple[Sheet, ...], cloud: Cloud, photos: Photos, free: FreeSpace, options: AssembleOptions
 ) -> list[Decided]:
     """Every pair of boards that meets cut on sheet, with corners decided."""
     scene = _Scene(sheets, cloud, photos, Obstacles(sheets, options.outline_error * cloud.diameter), free, options)
-    near, far = _all_joints(scene)
+    near, far, doubtful = _all_joints(scene)
     found: list[Decided] = []
     for a in range(len(sheets)):
         for b in range(a + 1, len(sheets)):
             keys = ((a, b), (b, a))
             either = [near.get(key) or _unfinished(scene, far.get(key)) for key in keys]
-            if all(either) and any(key in near for key in keys):
+            either = [one or (doubtful.get(key) if other and key[::-1] not in near else None)
+                      for key, one, other in zip(keys, either, either[::-1], strict=True)]
+            if all(either) and any(key in near or key in doubtful for key in keys):
                 found.append(_corner(scene, *either))
             elif any(either):
                 found.append(Decided(either[0] or either[1], 1, None, ContactEvidence()))
@@ -71,24 +78,25 @@ def find_contacts(
     return _like_their_twins(scene, found)
 
 
-def _all_joints(scene: _Scene) -> tuple[dict[tuple[int, int], Joint], dict[tuple[int, int], Joint]]:
-    """Joints by (a, b): those within the outline's own error, and those further apart."""
-    near, far, o = {}, {}, scene.options
-    for a in range(len(scene.sheets)):
-        for b in range(len(scene.sheets)):
-            if a == b:
-                continue
-            joint = end_on(
-                scene.sheets, a, b, scene.mm(o.far_reach), scene.mm(o.outline_error), scene.mm(1 / 200), scene.mm(o.min_contact)
-            )
-            if joint is None:
-                continue
-            if joint.gap > scene.mm(o.reach):
-                far[a, b] = joint
-            else:
-                near[a, b] = joint
+_Joints = dict[tuple[int, int], Joint]
+
+
+def _all_joints(scene: _Scene) -> tuple[_Joints, _Joints, _Joints]:
+    """Joints by (a, b): near ones, those further apart, and those where a's wood is not seen but may be."""
+    near, far, doubtful = {}, {}, {}
+    pairs = [(a, b) for a in range(len(scene.sheets)) for b in range(len(scene.sheets)) if a != b]
+    for a, b in pairs:
+        joint = end_on(scene.sheets, a, b, scene.search(scene.options.outline_error))
+        if joint is None:
+            maybe = end_on(scene.sheets, a, b, scene.search(scene.options.unseen_reach))
+            if maybe is not None and maybe.gap <= scene.mm(scene.options.reach):
+                doubtful[a, b] = maybe
+        elif joint.gap > scene.mm(scene.options.reach):
+            far[a, b] = joint
+        else:
+            near[a, b] = joint
     near = {key: j for key, j in near.items() if _is_contact(scene, j, near.get(key[::-1]) or far.get(key[::-1]))}
-    return near, far
+    return near, far, doubtful
 
 
 def _end_is_seen(scene: _Scene, joint: Joint) -> bool:
@@ -181,11 +189,11 @@ def _middle(sheet: Sheet) -> np.ndarray:
 
 def _like_their_twins(scene: _Scene, found: list[Decided]) -> list[Decided]:
     """Corners that the photographs leave open are decided as the corners between boards of the same sizes are."""
-    clear = [d for d in found if d.kind == 2 and d.evidence.decided_by == "seam"]
+    clear = [d.joint for d in found if d.kind == 1 or d.evidence.decided_by == "seam"]
     out = []
     for d in found:
         if d.kind == 2 and d.evidence.decided_by == "default":
-            votes = sum(_alike(scene, d.joint, c.joint) - _alike(scene, d.joint, c.other) for c in clear)
+            votes = sum(_alike(scene, d.joint, c) - _alike(scene, d.other, c) for c in clear)
             if votes < 0:
                 d = Decided(d.other, 2, d.joint, _swapped(d.evidence))
         out.append(d)
@@ -202,8 +210,15 @@ def _alike(scene: _Scene, one: Joint, other: Joint) -> int:
 
 
 def _same_size(a: Sheet, b: Sheet) -> bool:
-    area = a.region.area / b.region.area
-    return 0.75 < area < 1.33 and abs(a.thickness.value - b.thickness.value) < 0.15 * b.thickness.value
+    sides = np.array([_sides(s) for s in (a, b)])
+    alike = np.abs(sides[0] - sides[1]) < 0.2 * sides.max(axis=0)
+    return bool(alike.all()) and abs(a.thickness.value - b.thickness.value) < 0.15 * b.thickness.value
+
+
+def _sides(sheet: Sheet) -> np.ndarray:
+    """Length and width of the smallest rectangle about the region, mm."""
+    ring = np.asarray(sheet.region.minimum_rotated_rectangle.exterior.coords)
+    return np.sort(np.linalg.norm(np.diff(ring[:3], axis=0), axis=1))
 
 
 def to_contact(decided: Decided, sheets: tuple[Sheet, ...]) -> Contact:

@@ -14,7 +14,7 @@ from shapely.geometry import Polygon
 
 from kerfwright.identify.types import Sheet
 
-__all__ = ["Joint", "Trace", "columns", "end_on", "face_plane", "runs_of", "trace_of"]
+__all__ = ["Joint", "Search", "Trace", "columns", "end_on", "face_plane", "runs_of", "trace_of"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,12 +72,21 @@ class Joint:
         return sum(high - low for low, high in self.intervals)
 
 
-def end_on(sheets: tuple[Sheet, ...], a: int, b: int, reach: float, slack: float, step: float, shortest: float) -> Joint | None:
-    """Whether b ends on a, and where: the better of a's two faces.
+@dataclass(frozen=True)
+class Search:
+    """Where a joint is looked for, mm: how far b's outline may be from the plane, how wrong outlines are, how far beyond its outline
+    a may have wood, the width of a column, and the shortest interface."""
 
-    reach: how far b's outline may be from the plane; slack: how far it may go on behind a; step: column width, mm.
-    """
-    found = [_end_on_face(sheets, a, b, face, reach, slack, step, shortest) for face in ("top", "bottom")]
+    reach: float
+    slack: float
+    cover: float
+    step: float
+    shortest: float
+
+
+def end_on(sheets: tuple[Sheet, ...], a: int, b: int, search: Search) -> Joint | None:
+    """Whether b ends on a, and where: the better of a's two faces."""
+    found = [_end_on_face(sheets, a, b, face, search) for face in ("top", "bottom")]
     found = [j for j in found if j is not None]
     return max(found, key=lambda j: (round(j.length), -abs(j.gap))) if found else None
 
@@ -89,10 +98,8 @@ def face_plane(sheet: Sheet, face: str) -> tuple[np.ndarray, float]:
     return -sheet.normal, -float(sheet.normal @ sheet.world_from_board[:3, 3])
 
 
-def _end_on_face(
-    sheets: tuple[Sheet, ...], a: int, b: int, face: str, reach: float, slack: float, step: float, shortest: float
-) -> Joint | None:
-    one, other = sheets[a], sheets[b]
+def _end_on_face(sheets: tuple[Sheet, ...], a: int, b: int, face: str, search: Search) -> Joint | None:
+    one, other, reach, slack, step = sheets[a], sheets[b], search.reach, search.slack, search.step
     trace = trace_of(other, *face_plane(one, face))
     if trace is None:
         return None
@@ -101,11 +108,11 @@ def _end_on_face(
         return None
     hidden = one.thickness.value / trace.sine + slack
     ends = (first > -hidden) & (first < reach) & (last > reach / 2)
-    ends &= _has_wood(one, other, trace, along, slack)
+    ends &= _has_wood(one, other, trace, along, search.cover)
     if not ends.any():
         return None
     ends &= first < 2 * max(float(np.median(first[ends])), 0.0) + slack  # deeper columns end beside a, not before it
-    intervals = runs_of(along, ends, step, shortest, joining=reach)
+    intervals = runs_of(along, ends, step, search.shortest, joining=max(slack, 2 * step))
     if not intervals:
         return None
     inside = np.zeros(len(along), bool)

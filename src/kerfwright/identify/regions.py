@@ -18,7 +18,7 @@ from skimage.morphology import disk
 __all__ = ["Raster", "occupancy", "polygons"]
 
 NEAR_SHARE = 0.35  # a cell is wood when its density is at least this share of the density round about
-VEIL_SHARE = 0.15  # ... and this share of the density of a face seen well
+VEIL_SHARE = 0.12  # ... and this share of the density of a face seen well
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ def occupancy(raster: Raster, xy: np.ndarray, spacing: float) -> np.ndarray:
 
 def polygons(raster: Raster, wood: np.ndarray, min_area: float, min_hole: float) -> list[Polygon]:
     """Connected pieces of a mask as polygons with holes, largest first; areas in mm2."""
-    wood = binary_opening(binary_closing(wood, iterations=1), structure=disk(2))
+    wood = binary_opening(binary_closing(wood, iterations=1), structure=disk(1))
     pieces = []
     numbered = label(wood, connectivity=1)
     for number in range(1, numbered.max() + 1):

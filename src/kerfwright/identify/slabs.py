@@ -128,6 +128,8 @@ def _common(known: list[tuple[_Seed, list[ThicknessHypothesis]]], most: int = 2)
     while len(values) and len(found) < most:
         near = np.abs(values[:, None] - values[None]) < 0.08 * values[:, None]
         best = near[int(np.argmax(near @ area))]
+        if found and area[best].sum() < 0.3 * found[0].support:
+            break
         value = float(np.median(values[best]))
         found.append(ThicknessHypothesis(value, 0.4 * value, "inferred", float(area[best].sum())))
         values, area = values[~best], area[~best]

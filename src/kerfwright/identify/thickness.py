@@ -22,7 +22,7 @@ from kerfwright.identify.types import Primitive
 __all__ = ["ThicknessHypothesis", "from_cut_faces", "from_opposite", "from_photos", "sharpened"]
 
 
-STEREO_BIAS = 0.8  # standard error of a stereo plane, in units of the noise of its points
+STEREO_BIAS = 2.0  # standard error of a stereo plane, in units of the noise of its points
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ def refined_assembly(
     outlines = tuple(outline for _, _, outline in pieces)
     sheets = []
     for number, (sheet, segments, outline) in enumerate(pieces):
-        region = constrained_region(outline_region(outline), segments, diameter / 8, diameter / 20)
+        region = constrained_region(outline_region(outline), segments, diameter / 6, diameter / 20)
         sheets.append(replace(sheet, name=f"board_{number + 1:02d}", region=region))
     exact = AssembleOptions(outline_error=1 / 200, reach=1 / 60)
     again = assemble(replace(parts, sheets=tuple(sheets)), capture, exact)

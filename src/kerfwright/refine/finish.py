@@ -34,7 +34,7 @@ def _board(
     number: int, outline: Outline, assembly: Assembly, diameter: float, options: RefineOptions
 ) -> tuple[Board, tuple[str, ...]]:
     sheet, segments = assembly.sheets[number], assembly.constraints[number]
-    region = constrained_region(sheet.region, segments, diameter / 8, diameter / 20)
+    region = constrained_region(sheet.region, segments, diameter / 6, diameter / 20)
     loops = to_loops(region, outline, segments, options.boundary_step * diameter)
     path, notes = _cut_path(loops, region, segments, options.boundary_step * diameter)
     return to_board(sheet, path, segments, outline.origin, notes), notes
