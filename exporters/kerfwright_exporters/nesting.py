@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = ["NestOptions", "Place", "nest"]
 
+EDGE = 1e-6  # of a cell; less than that in a cell is rounding
 TRIALS_A_BOARD = 12  # few boards have few orders worth trying
 WARMTH = 0.02  # of the cost: how much worse a layout the search takes at its start
 
@@ -105,8 +106,9 @@ class _Raster:
 
     def __init__(self, outlines: list[Polygon], options: NestOptions, cells: int) -> None:
         self.options = options
-        self.cell = (options.width + options.spacing) / cells
-        columns = int((options.length + options.spacing) / self.cell + 1e-9)
+        grown = np.array([options.length, options.width]) + options.spacing
+        columns = max(1, round(grown[0] / (grown[1] / cells)))
+        self.cell = grown / (columns, cells)  # all but square: whole cells in both directions, so that exact fits fit
         shapes = [[self._shape(outline, turn) for turn in options.turns] for outline in outlines]
         self.corners = [[corner for _, corner in row] for row in shapes]
         runs = [r for row in shapes for r, _ in row]
@@ -125,19 +127,12 @@ class _Raster:
 
     def _shape(self, outline: Polygon, turn: int) -> tuple[np.ndarray, np.ndarray]:
         """Runs (N, 3) of the grown outline, the longest first, and where its cell 0, 0 lies, mm."""
-        import shapely
         from shapely import affinity
 
         turned = affinity.rotate(outline, turn, origin=(0, 0))
         grown = turned.buffer(self.options.spacing / 2, join_style="mitre", mitre_limit=2.0)
-        low, high = np.array(grown.bounds).reshape(2, 2)
-        columns, rows = np.ceil((high - low) / self.cell - 1e-6).astype(int)
-        x, y = np.meshgrid(low[0] + self.cell * np.arange(columns), low[1] + self.cell * np.arange(rows), indexing="ij")
-        shapely.prepare(grown)
-        slack = 1e-6 * self.cell  # cells that the outline only touches are free
-        boxes = shapely.box(x + slack, y + slack, x + self.cell - slack, y + self.cell - slack)
-        runs = _runs(shapely.intersects(grown, boxes))
-        return runs[np.argsort(runs[:, 1] - runs[:, 2], kind="stable")], low
+        runs = _runs(grown, self.cell)
+        return runs[np.argsort(runs[:, 1] - runs[:, 2], kind="stable")], np.array(grown.bounds[:2])
 
     def cost(self, order: np.ndarray) -> float:
         """Sheets before the last one, and the share of the last one's length that is used."""
@@ -156,9 +151,19 @@ class _Raster:
         return found
 
 
-def _runs(covered: np.ndarray) -> np.ndarray:
-    """Runs (N, 3) of column, first cell and cell after the last, of a mask (columns, cells)."""
-    edges = np.diff(np.pad(covered.astype(np.int8), ((0, 0), (1, 1))), axis=1)
-    column, first = np.nonzero(edges == 1)
-    _, last = np.nonzero(edges == -1)
-    return np.stack([column, first, last], axis=1)
+def _runs(shape: Polygon, cell: np.ndarray) -> np.ndarray:
+    """Runs (N, 3) of column, first cell and cell after the last that a shape covers, counted from its lower left.
+
+    What lies of the shape in one column is in connected parts, and a part touches every cell between its ends.
+    """
+    import shapely
+
+    low, high = np.array(shape.bounds).reshape(2, 2)
+    columns = int(np.ceil((high[0] - low[0]) / cell[0] - EDGE))
+    left = low[0] + cell[0] * np.arange(columns)
+    slack = EDGE * cell[0]  # what only touches the next column is not in it
+    strips = shapely.box(left + slack, low[1] - 1, left + cell[0] - slack, high[1] + 1)
+    parts, column = shapely.get_parts(shapely.intersection(shape, strips), return_index=True)
+    ends = (shapely.bounds(parts)[:, [1, 3]] - low[1]) / cell[1]
+    first, last = np.floor(ends[:, 0] + EDGE), np.ceil(ends[:, 1] - EDGE)
+    return np.stack([column, first, np.maximum(last, first + 1)], axis=1).astype(np.int64)
