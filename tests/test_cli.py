@@ -27,8 +27,8 @@ def act(path, options):
 def final(*_):
     return Model(name="stool", findings={findings})
 
-def written(model, capture, folder):
-    (folder / "model.json").write_text(model.model_dump_json())
+def written(found, folder):
+    (folder / "model.json").write_text(found.model.model_dump_json())
 
 pipeline.STAGES = (
     pipeline.Stage("capture", "Reading", ("path",), act),
@@ -224,8 +224,8 @@ def stage(name, needs):
         return Model(name=name) if name == "check" else name
     return pipeline.Stage(name, name, needs, run)
 
-def written(model, capture, folder):
-    (folder / "model.json").write_text(model.model_dump_json())
+def written(found, folder):
+    (folder / "model.json").write_text(found.model.model_dump_json())
     if dies == "write":
         os.kill(os.getppid(), 9)
         import time; time.sleep(5)

@@ -79,7 +79,8 @@ def test_an_assumed_scale_is_said_and_a_given_one_is_not():
 
 def test_the_model_says_where_it_lies_and_what_it_came_from():
     model = merged()
-    assert model.capture_from_model == ((0.002, 0, 0, 1), (0, 0.002, 0, 2), (0, 0, 0.002, 3), (0, 0, 0, 1))
+    expected = np.array([[0.002, 0, 0, 1], [0, 0.002, 0, 2], [0, 0, 0.002, 3], [0, 0, 0, 1]])
+    np.testing.assert_allclose(model.capture_from_model, expected, rtol=1e-12)
     origin = model.provenance
     assert (origin.version, origin.capture, origin.seed) == (__version__, "stool", 3)
     assert (origin.points, origin.images) == (5, 0)

@@ -12,14 +12,14 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from kerfwright import __version__
 from kerfwright.cache import NO_CACHE, StageCache, folder_hash, program_hash
 from kerfwright.output import OutputFolder
 from kerfwright.progress import Reporter
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from kerfwright.assemble.types import Assembly
     from kerfwright.capture.types import Capture
     from kerfwright.identify.types import Parts
@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 __all__ = ["STAGES", "ReconstructOptions", "Reconstruction", "Stage", "reconstruct", "run_stages", "stage_cache"]
 
 
-WORKING_SIZE = 500.0  # units that the object's largest side has inside the stages; their lengths are millimetres at that size
+# Units that the object's largest side has inside the stages; their lengths are millimetres at that size.
+WORKING_SIZE = 500.0
 
 
 @dataclass(frozen=True)
@@ -61,11 +62,21 @@ class Stage:
 
 @dataclass(frozen=True, eq=False)
 class Reconstruction:
-    """The model, and what the report draws it from."""
+    """The model, and what it was made from, in the stages' working units."""
 
     model: Model
     capture: Capture
     parts: Parts
+
+    @property
+    def capture_in_model(self) -> Capture:
+        """The capture with the model's frame and millimetres for its world: to draw the two together."""
+        import numpy as np
+
+        from kerfwright.capture.frame import moved
+
+        model_from_capture = np.linalg.inv(np.array(self.model.capture_from_model))
+        return moved(self.capture, model_from_capture @ self.capture.capture_from_world)
 
 
 def reconstruct(
@@ -129,6 +140,8 @@ def _in_working_units(capture: Capture) -> Capture:
 
     What limits every stage, noise and pixels, grows with the object that fills the photographs.
     """
+    import numpy as np
+
     from kerfwright.capture.frame import moved, similarity
 
     return moved(capture, similarity(WORKING_SIZE / capture.cloud.diameter, np.eye(3), np.zeros(3)))
@@ -173,6 +186,8 @@ def _model(refined: Refined, parts: Parts, capture: Capture, options: Reconstruc
     """Gather what the stages found, their findings in the stages' order."""
     from dataclasses import asdict
 
+    import numpy as np
+
     from kerfwright.model import Model, Provenance
     from kerfwright.model.frames import rows
     from kerfwright.model.resize import resized_board, resized_contact
@@ -195,6 +210,8 @@ def _model(refined: Refined, parts: Parts, capture: Capture, options: Reconstruc
 
 def _world_from_model(capture: Capture) -> np.ndarray:
     """4x4 from the model's millimetres to the working units of the stages."""
+    import numpy as np
+
     units_of_capture = float(np.cbrt(np.linalg.det(capture.capture_from_world[:3, :3])))
     scale = 1.0 / (units_of_capture * capture.scale.millimetres_per_unit)
     return np.diag([scale, scale, scale, 1.0])

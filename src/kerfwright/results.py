@@ -22,18 +22,19 @@ from kerfwright.report.page import report_html
 from kerfwright.versions import library_versions
 
 if TYPE_CHECKING:
-    from kerfwright.capture.types import Capture
+    from kerfwright.pipeline import Reconstruction
 
 __all__ = ["write_results", "write_run"]
 
 
-def write_results(model: Model, capture: Capture, folder: Path) -> None:
+def write_results(found: Reconstruction, folder: Path) -> None:
     """Write model.json, report.json, report.html, model.step and parts/*.dxf."""
     from kerfwright_exporters import export_all
     from kerfwright_exporters.naming import board_colours
 
+    model = found.model
     write_model(model, folder / "model.json")
-    page = report_html(model, capture, board_colours(model))
+    page = report_html(model, found.capture_in_model, board_colours(model))
     (folder / "report.html").write_text(page, encoding="utf-8")
     _write_json(folder / "report.json", report(model))
     # To look at the files is how one finds out what is wrong with them; `force` stamps them NOT VERIFIED then.

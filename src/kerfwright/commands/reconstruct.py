@@ -90,7 +90,7 @@ def _reconstruct_into(
 
     def fill(partial: Path) -> None:
         with reporter.stage("write", "Writing the results"):
-            write_results(found.model, found.capture, partial)
+            write_results(found, partial)
         write_run(reporter, partial / "run.json")
 
     found = pipeline.reconstruct(capture, options, reporter, pipeline.stage_cache(capture, options, folder))
