@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kerfwright.refine.curves.ranges import ARC, CUBIC
+from kerfwright.refine.curves.ranges import ARC, CUBIC, LINE
 from kerfwright.refine.curves.snap import GuideLine
 
 __all__ = ["Shape", "end_turn", "equations", "feet", "residuals"]
@@ -80,35 +80,48 @@ def _bounded(bulge: float) -> float:
 
 
 def feet(shape: Shape, k: int, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Parameters (M,), nearest points (M, 2) on edge k, and signed distances (M,), positive on the left."""
-    if shape.kinds[k] == ARC:
-        t = _arc_feet(shape, k, points)
-    elif shape.kinds[k] == CUBIC:
-        t = _cubic_feet(shape.controls(k), points)
-    else:
-        a, d = shape.node(k), shape.node(k + 1) - shape.node(k)
-        t = np.clip((points - a) @ d / max(d @ d, 1e-12), 0, 1)
-    at = _position(shape, k, t)
-    normal = _normals(shape, k, t, points - at)
-    return t, at, ((points - at) * normal).sum(axis=1)
+    """Parameters (M,) of the nearest points on edge k, left normals (M, 2) there, and signed distances (M,), left
+    positive.
+
+    Beyond the edge's ends the normal is the way to the point, so that the distance is the whole one.
+    """
+    if shape.kinds[k] == LINE:
+        return _line_feet(shape.node(k), shape.node(k + 1), points)
+    t = _arc_feet(shape, k, points) if shape.kinds[k] == ARC else _cubic_feet(shape.controls(k), points)
+    velocity = _velocity(shape, k, t)
+    velocity /= np.maximum(np.hypot(velocity[:, 0], velocity[:, 1]), 1e-12)[:, None]
+    normal = np.column_stack([-velocity[:, 1], velocity[:, 0]])
+    return t, *_outward(points - _position(shape, k, t), normal, t)
+
+
+def _line_feet(a: np.ndarray, b: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    d = b - a
+    length = max(float(np.hypot(*d)), 1e-9)
+    t = np.clip((points - a) @ d / length**2, 0, 1)
+    normal = np.repeat(np.array([[-d[1], d[0]]]) / length, len(points), axis=0)
+    return t, *_outward(points - a - t[:, None] * d, normal, t)
+
+
+def _outward(gap: np.ndarray, normal: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Normals, turned towards the points beyond the ends, and distances along them."""
+    distance = (gap * normal).sum(axis=1)
+    end = np.flatnonzero((t <= 0) | (t >= 1))
+    far = np.hypot(gap[end, 0], gap[end, 1])
+    end, far = end[far > 1e-9], far[far > 1e-9]
+    signed = np.where(distance[end] < 0, -far, far)
+    normal[end], distance[end] = gap[end] / signed[:, None], signed
+    return normal, distance
 
 
 def residuals(shape: Shape, k: int, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Signed distances (M,) of points to edge k and their derivatives (M, C) by the unknowns `columns(k)`."""
-    t, at, distance = feet(shape, k, points)
-    normal = _normals(shape, k, t, points - at)
-    return distance, -np.einsum("md,mdc->mc", normal, _derivative(shape, k, t))
-
-
-def _normals(shape: Shape, k: int, t: np.ndarray, gap: np.ndarray) -> np.ndarray:
-    """Left normals of the edge; beyond its ends the way to the point."""
-    tangent = _velocity(shape, k, t)
-    tangent = tangent / np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-12)
-    normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
-    far = np.linalg.norm(gap, axis=1, keepdims=True)
-    outside = ((t <= 0) | (t >= 1))[:, None] & (far > 1e-9)
-    side = np.where((gap * normal).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
-    return np.where(outside, side * gap / np.maximum(far, 1e-12), normal)
+    t, normal, distance = feet(shape, k, points)
+    if shape.kinds[k] == LINE:
+        return distance, -np.hstack([normal * (1 - t)[:, None], normal * t[:, None]])
+    if shape.kinds[k] == CUBIC:
+        basis = _bernstein(t)[:, [0, 3, 1, 2]]
+        return distance, -(basis[:, :, None] * normal[:, None, :]).reshape(len(t), 8)
+    return distance, -np.einsum("md,mdc->mc", normal, _arc_derivative(shape, k, t))
 
 
 def _bernstein(t: np.ndarray) -> np.ndarray:
@@ -120,8 +133,6 @@ def _position(shape: Shape, k: int, t: np.ndarray) -> np.ndarray:
     if shape.kinds[k] == CUBIC:
         return _bernstein(t) @ shape.controls(k)
     a, b = shape.node(k), shape.node(k + 1)
-    if shape.kinds[k] != ARC:
-        return a + t[:, None] * (b - a)
     weights, middle = _arc_weights(shape, k, t)
     top = weights[:, :1] * a + weights[:, 1:2] * middle + weights[:, 2:3] * b
     return top / weights[:, 3:]
@@ -151,11 +162,11 @@ def _arc_feet(shape: Shape, k: int, points: np.ndarray) -> np.ndarray:
 
 
 def _cubic_feet(control: np.ndarray, points: np.ndarray) -> np.ndarray:
-    grid = np.linspace(0, 1, 33)
+    grid = np.linspace(0, 1, 21)
     at = _bernstein(grid) @ control
     t = grid[((points[:, None] - at[None]) ** 2).sum(axis=2).argmin(axis=1)]
     d1, d2 = 3 * np.diff(control, axis=0), 6 * np.diff(control, 2, axis=0)
-    for _ in range(5):
+    for _ in range(4):
         s = 1 - t
         gap = _bernstein(t) @ control - points
         v = np.column_stack([s * s, 2 * s * t, t * t]) @ d1
@@ -171,21 +182,14 @@ def _velocity(shape: Shape, k: int, t: np.ndarray) -> np.ndarray:
         d = np.diff(shape.controls(k), axis=0)
         s = 1 - t
         return np.column_stack([s * s, 2 * s * t, t * t]) @ d
-    if shape.kinds[k] != ARC:
-        return np.repeat((shape.node(k + 1) - shape.node(k))[None], len(t), axis=0)
     centre, _, _, sweep = shape.arc(k)
     spoke = _position(shape, k, t) - centre
     return np.sign(sweep) * np.column_stack([-spoke[:, 1], spoke[:, 0]])
 
 
-def _derivative(shape: Shape, k: int, t: np.ndarray) -> np.ndarray:
-    """(M, 2, C) derivatives of the points at parameters t by the unknowns of edge k."""
+def _arc_derivative(shape: Shape, k: int, t: np.ndarray) -> np.ndarray:
+    """(M, 2, 5) derivatives of the points at parameters t by the nodes and the bulge of arc k."""
     eye = np.eye(2)
-    if shape.kinds[k] == CUBIC:
-        basis = _bernstein(t)[:, [0, 3, 1, 2]]
-        return np.einsum("mk,de->mdke", basis, eye).reshape(len(t), 2, 8)
-    if shape.kinds[k] != ARC:
-        return np.einsum("mk,de->mdke", np.column_stack([1 - t, t]), eye).reshape(len(t), 2, 4)
     weights, _ = _arc_weights(shape, k, t)
     bulge = _bounded(shape.unknowns[shape.extra(k)][0])
     half, rate = 2 * np.arctan(bulge), 2 / (1 + bulge**2)

@@ -19,6 +19,8 @@ from kerfwright.refine.curves.snap import GuideLine
 __all__ = ["Equations", "Fit", "constrained_step", "distances", "normal_equations", "solve", "taken_stock"]
 
 ROBUST = 4.0  # standard errors at which an observation has lost three quarters of its weight (Geman-McClure)
+NODE_REACH = 20.0  # mm: how far nodes may move along the boundary before samples must change edges
+_SETTLED = 0.02  # chi-square; a structure's price is some hundred times that
 _RANK = 1e-9
 Equations = Callable[[Shape], tuple[np.ndarray, np.ndarray]]
 
@@ -39,30 +41,41 @@ class Fit:
 
 
 def distances(shape: Shape, samples: Samples) -> tuple[np.ndarray, np.ndarray]:
-    """Signed distance (N,) and edge (N,) of each sample; the nearest of the edge of its range and that one's
-    neighbours.
+    """Signed distance (N,) and edge (N,) of each sample: of its range's edge, or near a node of the neighbour if
+    nearer.
     """
     best = np.full(samples.count, np.inf)
     edge = np.zeros(samples.count, int)
-    member = _membership(shape, samples.count)
-    for k in range(shape.count):
-        near = {(k - 1) % shape.count, k, (k + 1) % shape.count}
-        mine = np.flatnonzero(np.isin(member, list(near)))
-        if not len(mine):
-            continue
-        _, at, signed = feet(shape, k, samples.points[mine])
-        gap = np.linalg.norm(samples.points[mine] - at, axis=1)
-        gap = np.where(member[mine] == k, gap, gap + 1e-6)
-        better = gap < np.abs(best[mine])
-        best[mine[better]], edge[mine[better]] = np.copysign(gap, signed)[better], k
+    reach = samples.steps(NODE_REACH)
+    for own in (True, False):
+        for k in range(shape.count):
+            mine = _own(shape, k, samples.count) if own else _beyond(shape, k, samples.count, reach)
+            if not len(mine):
+                continue
+            signed = feet(shape, k, samples.points[mine])[2]
+            better = np.abs(signed) < np.abs(best[mine]) - 1e-6
+            best[mine[better]], edge[mine[better]] = signed[better], k
     return best, edge
 
 
-def _membership(shape: Shape, count: int) -> np.ndarray:
-    member = np.zeros(count, int)
-    for k, (first, last) in enumerate(shape.ranges):
-        member[np.arange(first, last) % count] = k
-    return member
+def _own(shape: Shape, k: int, count: int) -> np.ndarray:
+    return np.arange(*shape.ranges[k]) % count
+
+
+def _beyond(shape: Shape, k: int, count: int, reach: int) -> np.ndarray:
+    """Samples of the neighbouring edges next to edge k's nodes."""
+    if shape.count < 2:
+        return np.zeros(0, int)
+    before, after = shape.ranges[k - 1], shape.ranges[(k + 1) % shape.count]
+    return (
+        np.concatenate(
+            [
+                np.arange(max(before[0], before[1] - reach), before[1]),
+                np.arange(after[0], min(after[1], after[0] + reach)),
+            ]
+        )
+        % count
+    )
 
 
 def solve(
@@ -82,7 +95,7 @@ def solve(
         merit = _merit(trial_system[2], both(trial)[0], samples)
         if best is None or merit <= best * (1 + 1e-9) + 1e-9:
             shape, system, damping = trial, trial_system, max(damping / 5, 1e-9)
-            small = best is not None and best - merit < 1e-4 * max(1.0, best) and np.abs(step).max() < 1e-2
+            small = best is not None and best - merit < _SETTLED
             best = merit
             if small:
                 break
