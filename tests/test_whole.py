@@ -1,0 +1,83 @@
+"""The whole pipeline on the capture that ships: what a user gets, against the truth."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+FIXTURE = Path(__file__).parent.parent / "fixtures" / "stool"
+
+
+def _reconstruct(capture: Path, out: Path) -> None:
+    command = [sys.executable, "-m", "kerfwright", "reconstruct", str(capture), "-o", str(out), "--quiet"]
+    subprocess.run(command, check=True, timeout=400)
+
+
+@pytest.fixture(scope="module")
+def stool(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("whole") / "out"
+    _reconstruct(FIXTURE, out)
+    return out
+
+
+@pytest.fixture(scope="module")
+def figures(stool: Path) -> dict:
+    from kerfwright.evaluate import evaluate
+
+    return evaluate(stool, FIXTURE / "truth")
+
+
+def test_every_board_and_no_other(figures):
+    assert (figures["parts_matched"], figures["extra"]) == (4, [])
+    assert figures["mean_iou_seen"] > 0.9
+
+
+def test_every_contact_with_its_type(figures):
+    assert figures["contacts_typed_right"] == figures["contacts_found"] == figures["contacts_true"] == 4
+
+
+def test_surface_is_near_the_truth(figures):
+    assert figures["rmse_pct_seen_to_model"] < 0.2
+    assert max(board["cut_mm"][0] for board in figures["boards"].values()) < 1.0
+
+
+def test_solids_are_valid_and_apart(figures):
+    assert figures["solids_valid"]
+    assert figures["interference_mm3"] < 1.0
+
+
+def test_cadquery_reads_the_step_file(stool):
+    import cadquery
+
+    from kerfwright.model import read_model
+    from kerfwright.solid import assembly_solids
+
+    own = sorted(solid.volume for _, solid in assembly_solids(read_model(stool / "model.json")))
+    read = sorted(solid.Volume() for solid in cadquery.importers.importStep(str(stool / "model.step")).solids().vals())
+    assert read == pytest.approx(own, rel=1e-6)
+
+
+def test_report_says_where_the_model_lies(stool):
+    from kerfwright.model import read_model
+
+    place = np.array(json.loads((stool / "report.json").read_text())["capture_from_model"])
+    tops = [board for board in read_model(stool / "model.json").boards if abs(np.array(board.model_from_board)[2, 2]) > 0.99]
+    height = max(np.array(board.model_from_board)[2, 3] + max(board.thickness.value * np.sign(np.array(board.model_from_board)[2, 2]), 0) for board in tops)
+    assert place[2, 2] * height + place[2, 3] == pytest.approx(0.400, abs=1e-3)  # metres; the seat is 400 mm high
+
+
+def test_same_input_gives_the_same_bytes(stool, tmp_path):
+    _reconstruct(FIXTURE, tmp_path / "again")
+    assert _digests(tmp_path / "again") == _digests(stool)
+
+
+def _digests(out: Path) -> dict[str, str]:
+    """Hash of every file that promises to be reproducible."""
+    files = [p for p in sorted(out.rglob("*")) if p.is_file() and p.name != "run.json" and ".cache" not in p.parts]
+    return {str(p.relative_to(out)): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
