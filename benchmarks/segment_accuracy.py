@@ -1,11 +1,11 @@
 """How exact outlines are: segmentation of rough boards made from the truth, scored against it.
 
-    python benchmarks/segment_accuracy.py [CAPTURE ...] [--rough cloud|blob] [--views N] [--no-images] [--overlays DIR] [--seed N]
+    python benchmarks/segment_accuracy.py [CAPTURE ...] [--rough cloud|blob] [--views N] [--no-images] [--overlays DIR]
 
-A rough board has its planes fitted to its cloud points (as identification would) or moved by --plane-mm and --plane-degrees, and its
-region from the density of these points (cloud) or from the true outline with a wavy error (blob). Constraint segments come from the
-true contacts. A row a board: IoU with the true outline, mean and 95th percentile boundary distance in mm, before and after. A board
-is `whole` when some photograph shows all of it.
+A rough board has its planes fitted to its cloud points (as identification would) or moved by --plane-mm and --plane-
+degrees, and its region from the density of these points (cloud) or from the true outline with a wavy error (blob).
+Constraint segments come from the true contacts. A row a board: IoU with the true outline, mean and 95th percentile
+boundary distance in mm, before and after. A board is `whole` when some photograph shows all of it.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ import json
 import resource
 import time
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -55,7 +57,8 @@ def load(folder: Path) -> tuple[Capture, list[TrueBoard], list[dict]]:
     """The capture in the truth's frame, mm, and the true boards and connections."""
     truth = json.loads((folder / "truth" / "truth.json").read_text())
     frame = json.loads((folder / "truth" / "frame.json").read_text())
-    scale, turn, shift = frame.get("scale", 1.0), np.array(frame.get("turn", np.eye(3))), np.array(frame.get("shift", [0] * 3))
+    scale = frame.get("scale", 1.0)
+    turn, shift = np.array(frame.get("turn", np.eye(3))), np.array(frame.get("shift", [0] * 3))
     world_from_capture = similarity(1000 / scale, turn.T, -1000 / scale * turn.T @ shift)
     boards = []
     for part in truth["parts"]:
@@ -132,7 +135,8 @@ def density_region(xy: np.ndarray, pitch: float = 2.0, sigma: float = 4.0) -> Po
     raster = np.zeros(index.max(0)[::-1] + 12, np.float32)
     np.add.at(raster, (index[:, 1], index[:, 0]), 1)
     smooth = cv2.GaussianBlur(raster, (0, 0), sigma / pitch)
-    rings = [Polygon(low + (c[:, ::-1] + 0.5) * pitch) for c in find_contours(smooth, 0.3 * np.median(smooth[raster > 0])) if len(c) > 8]
+    contours = find_contours(smooth, 0.3 * np.median(smooth[raster > 0]))
+    rings = [Polygon(low + (c[:, ::-1] + 0.5) * pitch) for c in contours if len(c) > 8]
     region = Polygon()
     for ring in sorted((r.buffer(0) for r in rings if r.area > 100), key=lambda p: -p.area):
         region = region.symmetric_difference(ring)
@@ -167,7 +171,7 @@ def true_constraints(board: TrueBoard, sheet: Sheet, boards: list[TrueBoard]) ->
     found = []
     for ring in (orient(board.outline).exterior, *orient(board.outline).interiors):
         corners = np.asarray(ring.coords)[:, :2]
-        for a, b in zip(corners[:-1], corners[1:], strict=True):
+        for a, b in pairwise(corners):
             length = np.linalg.norm(b - a)
             if length > 15:
                 found += _runs(board, sheet, boards, a, b, length)
@@ -228,12 +232,17 @@ def polygon_of(result: BoardOutlines):
     ])
 
 
+def in_rough(board: TrueBoard, sheet: Sheet, z: float, xy: np.ndarray) -> np.ndarray:
+    """Points of the true board's frame at height z in the rough board's."""
+    return sheet.to_board(board.to_world(np.column_stack([xy, np.full(len(xy), z)])))[:, :2]
+
+
 def overlay(path: Path, capture: Capture, sheet: Sheet, result: BoardOutlines, true: TrueBoard) -> None:
     """Rectified photographs with the rough outline (blue), the found one (green) and the true one (red)."""
     import cv2
 
     from kerfwright.refine.segment.grid import grid_over
-    from kerfwright.refine.segment.rectify import pixels_at, sample, Photos
+    from kerfwright.refine.segment.rectify import Photos, pixels_at, sample
 
     grid = grid_over(sheet.region, 26, 1.0, 400_000)
     tiles, photos = [], Photos()
@@ -242,14 +251,14 @@ def overlay(path: Path, capture: Capture, sheet: Sheet, result: BoardOutlines, t
         xy = grid.centres().reshape(-1, 2)
         tile, _ = sample(photos, view, pixels_at(sheet, view, xy, z).reshape(*grid.shape, 2))
         tile = cv2.resize(tile[:, :, ::-1], None, fx=2, fy=2)
-        back = shapely.transform(true.outline, lambda p: sheet.to_board(true.to_world(np.column_stack([p, np.full(len(p), z)])))[:, :2])
+        back = shapely.transform(true.outline, partial(in_rough, true, sheet, z))
         for polygon, colour in ((sheet.region, (255, 120, 0)), (back, (0, 0, 255)), (polygon_of(result), (0, 255, 0))):
             for p in getattr(polygon, "geoms", [polygon]):
                 for r in (p.exterior, *p.interiors):
                     index = (grid.to_index(np.asarray(r.coords)[:, :2]) + 0.5) * 2 * 16
                     cv2.polylines(tile, [index.astype(np.int32)], True, colour, 1, cv2.LINE_AA, 4)
         tiles.append(tile)
-    height, width = tiles[0].shape[:2]
+    width = tiles[0].shape[1]
     across = max(1, 1800 // width)
     tiles += [np.zeros_like(tiles[0])] * (-len(tiles) % across)
     cv2.imwrite(str(path), np.vstack([np.hstack(tiles[i:i + across]) for i in range(0, len(tiles), across)]))
@@ -273,15 +282,17 @@ def run(name: str, options) -> list[tuple[float, ...]]:
         before = figures(board.outline, in_truth(board, sheet, sheet.region))
         after = figures(board.outline, in_truth(board, sheet, polygon_of(result)))
         se = np.median(np.concatenate([loop.standard_error for o in result.outlines for loop in o.loops]))
-        print(f"{name:14} {board.name:18} whole {whole:d} pieces {len(result.outlines)} views {len(result.views)} out {len(result.left_out)} "
-              f"shift {result.registration:.2f} px {result.pixel:.2f} before {before[0]:.3f} {before[1]:5.2f} {before[2]:5.2f} "
+        print(f"{name:14} {board.name:18} whole {whole:d} pieces {len(result.outlines)} views {len(result.views)} "
+              f"out {len(result.left_out)} shift {result.registration:.2f} px {result.pixel:.2f} "
+              f"before {before[0]:.3f} {before[1]:5.2f} {before[2]:5.2f} "
               f"after {after[0]:.3f} {after[1]:5.2f} {after[2]:5.2f} se {se:.2f} {result.fallback or ''}", flush=True)
         rows.append((*before, *after, whole))
         if options.overlays:
             options.overlays.mkdir(parents=True, exist_ok=True)
             overlay(options.overlays / f"{name}_{board.name}.png", capture, sheet, result, board)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-    print(f"{name:14} {seconds:.1f} s ({busy:.1f} s of processor), peak {peak:.2f} GiB, mean IoU {np.mean([r[3] for r in rows]):.4f}, "
+    print(f"{name:14} {seconds:.1f} s ({busy:.1f} s of processor), peak {peak:.2f} GiB, "
+          f"mean IoU {np.mean([r[3] for r in rows]):.4f}, "
           f"mean distance {np.mean([r[4] for r in rows]):.2f} mm", flush=True)
     return rows
 
@@ -299,7 +310,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     rows = np.array([r for name in options.names for r in run(name, options)])
-    print(f"all {len(rows)} boards: before {np.nanmean(rows[:, :3], 0).round(3)} after {np.nanmean(rows[:, 3:6], 0).round(3)}; "
+    print(f"all {len(rows)} boards: before {np.nanmean(rows[:, :3], 0).round(3)} "
+          f"after {np.nanmean(rows[:, 3:6], 0).round(3)}; "
           f"worst whole {rows[rows[:, 6] > 0, 3].min():.3f}")
 
 

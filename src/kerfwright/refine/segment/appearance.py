@@ -6,13 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["Mixture", "fit_mixture", "same_surface"]
+__all__ = ["Mixture", "fit_mixture", "same_surface", "with_shade"]
 
 FLOOR_VARIANCE = 2.0  # LAB units squared: sensor noise and JPEG; keeps flat colours from becoming spikes
 UNIFORM = np.log(1e-7)  # density of an unforeseen colour: LAB holds about 1e6 to 1e7 cubic units
 EM_STEPS = 6
+SHADES = (0.85, 0.72)  # of L + 16: light down to .6 and .37
+SHADE_SHARE = 0.05  # prior share of the inside in each shade
 SAME_VARIANCE = 16.0  # LAB units squared: one point seen by two views, after exposure was evened out
-SAME_SHARE = 0.05  # prior share of colours inside that the mixture doesn't know
+SAME_SHARE = 0.1  # prior share of colours inside that the mixture doesn't know
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +47,24 @@ def _logsumexp(values: np.ndarray) -> np.ndarray:
     return top + np.log(np.exp(values - top).sum(0))
 
 
-def same_surface(colours: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """(N,) log density of (N, 3) colours if they are of one surface point with the other views' mean (NaN: no other view).
+def with_shade(mixture: Mixture) -> Mixture:
+    """The mixture and darker copies of it: corners of furniture lie in the shade, and that is where clouds have gaps.
 
-    Only what lies on the sheet plane keeps its colour from view to view: a knot does, a dark patch of the carpet doesn't.
+    Less light scales all three of L + 16, a and b by the cube root of its loss (CIE 15, above the linear toe).
+    """
+    light = np.array([16.0, 0, 0])
+    copies = [(1 - SHADE_SHARE * len(SHADES), 1.0), *((SHADE_SHARE, s) for s in SHADES)]
+    return Mixture(
+        np.concatenate([share * mixture.weights for share, _ in copies]),
+        np.concatenate([(mixture.means + light) * s - light for _, s in copies]),
+        np.concatenate([mixture.whitening] * len(copies)),
+    )
+
+
+def same_surface(colours: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """(N,) log density of (N, 3) colours if of one surface point with the other views' mean (NaN: none).
+
+    Only what lies on the sheet plane keeps its colour from view to view: a knot does, a dark patch of carpet doesn't.
     """
     squared = ((colours - others) ** 2).sum(1) / SAME_VARIANCE
     log_density = np.log(SAME_SHARE) - 0.5 * squared - 1.5 * np.log(2 * np.pi * SAME_VARIANCE)
@@ -88,7 +104,8 @@ def _mixture(colours: np.ndarray, shares: np.ndarray) -> Mixture:
     mass = shares.sum(0)
     shares, mass = shares[:, mass > 3], mass[mass > 3]
     means = shares.T @ colours / mass[:, None]
-    second = np.einsum("nk,ni,nj->kij", shares, colours, colours, optimize=True) / mass[:, None, None]
+    products = (colours[:, :, None] * colours[:, None, :]).reshape(-1, 9)
+    second = (shares.T @ products).reshape(-1, 3, 3) / mass[:, None, None]
     covariance = second - means[:, :, None] * means[:, None, :] + FLOOR_VARIANCE * np.eye(3)
     whitening = np.linalg.inv(np.linalg.cholesky(covariance.astype(np.float64)))
     return Mixture((mass / mass.sum()).astype(np.float64), means.astype(np.float64), whitening)

@@ -1,4 +1,7 @@
-"""All boards of an object, in rounds: each round every board is cut out of the photographs with the others as the last round left them."""
+"""All boards of an object, in rounds.
+
+Each round every board is cut out of the photographs, the others being as the last round left them.
+"""
 
 from __future__ import annotations
 
@@ -113,7 +116,8 @@ def _begin(
     densities = [v.density for v in views] or [1.0]
     pixel = options.pixel or float(np.clip(1 / np.median(densities), options.min_pixel, options.max_pixel))
     limits = limits_of(constraints, sheet.thickness.value, CORNER_REACH * sheet.thickness.value)
-    grid = grid_over(_ground_covered(sheet.region, limits, options.contact_reach), options.search_margin + 4 * pixel, pixel, options.max_grid)
+    covered = _ground_covered(sheet.region, limits, options.contact_reach)
+    grid = grid_over(covered, options.search_margin + 4 * pixel, pixel, options.max_grid)
     excluded, crossing = carve(limits, grid)
     mask = fill_to_contacts(grid.mask(sheet.region) & ~excluded, limits, grid, options.contact_reach)
     shifts = [np.zeros(2) for _ in views]
@@ -128,7 +132,8 @@ def _ground_covered(region: Polygon, limits: Sequence[Limit], reach: float) -> P
 
 
 def _round(
-    board: _Board, boards: Sequence[_Board], occluders: Occluders, photos: Photos, options: SegmentOptions, round_idx: int
+    board: _Board, boards: Sequence[_Board], occluders: Occluders, photos: Photos, options: SegmentOptions,
+    round_idx: int,
 ) -> _Board:
     """One round of a board: evidence, cut, pieces, and how far its views must be moved."""
     if not board.views:
@@ -144,7 +149,7 @@ def _round(
     if not evidences:
         return replace(board, views=[], shifts=[])
     weights = smoothness_weights(contrasts, board.crossing, options.smoothness)
-    mask = cut(average(evidences, seeds, error), weights, seeds.inside, seeds.outside)
+    mask = cut(average(evidences, seeds), weights, seeds.inside, seeds.outside)
     masks = clean(mask, board.grid.pixel, options)
     if not masks:
         return replace(board, views=[], shifts=[])
@@ -195,7 +200,9 @@ def _chain(board: _Board, k: int, options: SegmentOptions) -> Chain:
     return chain_of(board.regions[k], options.step)
 
 
-def _scans(board: _Board, chain: Chain, occluders: Occluders, photos: Photos, options: SegmentOptions) -> list[EdgeScan]:
+def _scans(
+    board: _Board, chain: Chain, occluders: Occluders, photos: Photos, options: SegmentOptions
+) -> list[EdgeScan]:
     return [
         scan_edges(chain.points, chain.normals, chain.ring, board.sheet, board.idx, view, photos, occluders,
                    board.mask, board.grid, shift, options.reach)
@@ -246,7 +253,8 @@ def _outline(
 def _from_cloud(board: _Board, options: SegmentOptions) -> BoardOutlines:
     """The rough region, cut back to its constraints."""
     why = "no photograph shows the board well" if options.use_images else "photographs were not to be used"
-    chain = chain_of(board.sheet.region, options.step)
+    carved = clean(board.grid.mask(board.sheet.region) & ~board.excluded, board.grid.pixel, options)
+    chain = chain_of(pieces(carved[0], board.grid) if carved else board.sheet.region, options.step)
     error = np.full(len(chain.points), options.outline_error / 2)
     points, error = snap(chain.points, error, chain.normals, board.limits, options.outline_error)
     outline = Outline(loops_of(chain, points, error), "cloud", 0)

@@ -17,6 +17,7 @@ __all__ = ["Chain", "chain_of", "loops_of", "registration", "settle", "snap"]
 
 SMOOTH = 2.0  # mm along the boundary over which normals are averaged
 HUBER = 0.5  # mm
+PRIOR_POINTS = 40  # boundary points that the poses' own say is worth against the edges
 CLOUD_WINDOW = 3.0  # mm, along and across, in which cut-face points speak for a boundary point
 CLOUD_ERROR = 0.4  # mm that stereo drifts by, whatever the number of points
 CLOUD_LEAST = 6
@@ -24,7 +25,7 @@ CLOUD_LEAST = 6
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """All rings of one piece: points in order with outward unit normals, and the ring that each belongs to (0: outer)."""
+    """All rings of one piece: points in order, outward unit normals, and the ring that each belongs to (0: outer)."""
 
     points: np.ndarray  # (N, 2)
     normals: np.ndarray  # (N, 2)
@@ -58,10 +59,10 @@ def _resampled(ring, step: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def registration(chain: Chain, scans: Sequence[EdgeScan]) -> tuple[np.ndarray, np.ndarray]:
-    """(V, 2) shift of each view against the others, mm in the board's plane, and (V,) what remains after it (NaN: unknown)."""
+    """(V, 2) shift of each view against the others, mm in the plane; (V,) what remains after it (NaN: unknown)."""
     path = trace(scans, chain.ring)
     offset, weight = (np.array(a) for a in zip(*(view_offsets(s, path) for s in scans), strict=True))
-    mean = (offset * weight).sum(0) / np.maximum(weight.sum(0), 1e-9)
+    mean = np.ma.median(np.ma.array(offset, mask=weight <= 0), axis=0).filled(0.0)
     shared = (weight > 0).sum(0) >= 3
     found = [_shift(chain.normals[u], (o - mean)[u], w[u]) for o, w in zip(offset, weight, strict=True)
              for u in [shared & (w > 0)]]
@@ -72,7 +73,7 @@ def _shift(normals: np.ndarray, residual: np.ndarray, weight: np.ndarray) -> tup
     """The translation whose component along the normals is the residual, robustly; none from too few points."""
     if len(residual) < 30:
         return np.zeros(2), float("nan")
-    shift, ridge = np.zeros(2), 0.02 * weight.sum() * np.eye(2)
+    shift, ridge = np.zeros(2), PRIOR_POINTS * weight.mean() * np.eye(2)
     for _ in range(4):
         robust = weight / np.maximum(abs(residual - normals @ shift) / HUBER, 1)
         shift = np.linalg.solve(normals.T @ (robust[:, None] * normals) + ridge, normals.T @ (robust * residual))
@@ -85,7 +86,7 @@ def settle(
     """(N,) offset of each boundary point and its standard error, from the photographs and the cloud's cut faces."""
     path = trace(scans, chain.ring) if scans else np.zeros(len(chain.points))
     by_views = [(*view_offsets(s, path), _spread(s)) for s in scans]
-    photo, photo_error = _mean_over_views(by_views, path, pixel, options)
+    photo, photo_error = _mean_over_views(by_views, path, pixel)
     cloud, cloud_error = _cloud_offsets(chain, cut_points, path)
     weights = np.stack([photo_error**-2, cloud_error**-2])
     total = weights.sum(0)
@@ -97,7 +98,7 @@ def _spread(scan: EdgeScan) -> float:
     return 2.0 * float(scan.offsets[1] - scan.offsets[0])
 
 
-def _mean_over_views(by_views, path: np.ndarray, pixel: float, options: SegmentOptions) -> tuple[np.ndarray, np.ndarray]:
+def _mean_over_views(by_views, path: np.ndarray, pixel: float) -> tuple[np.ndarray, np.ndarray]:
     """Weighted mean of the views' offsets; its error from their spread, never below what one view is good for."""
     if not by_views:
         return path, np.full(len(path), 2 * pixel)

@@ -120,7 +120,7 @@ def _depth(limit: Limit, others: Sequence[Limit]) -> float:
 
 
 def fill_to_contacts(mask: np.ndarray, limits: Sequence[Limit], grid: Grid, reach: float) -> np.ndarray:
-    """The mask, run on to the segments that the board is known to reach: straight inward from each, up to `reach` mm."""
+    """The mask, run on to the segments that the board is known to reach: straight from each, up to `reach` mm."""
     filled = mask.copy()
     for limit in (m for m in limits if m.touching):
         _, _, length = limit.local(limit.start)

@@ -1,8 +1,9 @@
 """Where the boundary lies in the photographs, to a fraction of a pixel.
 
-Each photograph shows each stretch of a square cut as a silhouette: a stretch that faces away from the camera on the near sheet plane,
-one that faces it on the far sheet plane (beyond the near plane comes the cut face, wood beside wood). Colour profiles are read along
-the boundary's normal on that plane, straight from the photographs. Mixing both kinds cancels what an error of the plane would do.
+Each photograph shows each stretch of a square cut as a silhouette: a stretch that faces away from the camera on the
+near sheet plane, one that faces it on the far sheet plane (beyond the near plane comes the cut face, wood beside
+wood). Colour profiles are read along the boundary's normal on that plane, straight from the photographs. Mixing both
+kinds cancels what an error of the plane would do.
 """
 
 from __future__ import annotations
@@ -124,7 +125,7 @@ def _cheapest_loop(cost: np.ndarray) -> np.ndarray:
 
 @numba.njit(cache=True)
 def _viterbi(cost, bend):
-    """(M,) column of each row on the cheapest path; neighbouring rows differ by at most two columns, `bend` a column."""
+    """(M,) column of each row on the cheapest path; neighbours differ by at most two columns, at `bend` a column."""
     rows, columns = cost.shape
     best, back = cost[0].copy(), np.zeros((rows, columns), np.int32)
     for i in range(1, rows):
@@ -143,7 +144,7 @@ def _viterbi(cost, bend):
 
 
 def view_offsets(scan: EdgeScan, path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(N,) offset of a view's own peak near the traced boundary, to a fraction of the pitch, and its weight (0: no peak)."""
+    """(N,) offset of a view's own peak near the traced boundary, finer than the pitch; its weight (0: no peak)."""
     offsets, strength = scan.offsets, scan.strength
     near = abs(offsets[None] - path[:, None]) <= NEAR_PEAK
     k = np.where(near, strength, -1).argmax(1).clip(1, len(offsets) - 2)

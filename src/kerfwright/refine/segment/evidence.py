@@ -8,19 +8,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfwright.identify.types import Sheet
-from kerfwright.refine.segment.appearance import Mixture, fit_mixture, same_surface
+from kerfwright.refine.segment.appearance import Mixture, fit_mixture, same_surface, with_shade
 from kerfwright.refine.segment.grid import Grid
 from kerfwright.refine.segment.options import SegmentOptions
-from kerfwright.refine.segment.scene import BOARD, CLEAR, OCCLUDED, Occluders
+from kerfwright.refine.segment.scene import BOARD, CLEAR, Occluders
 from kerfwright.refine.segment.views import BoardView
 
-__all__ = ["Seeds", "ViewEvidence", "classes_on_grid", "cut_face_band", "average", "gather", "grown", "means_of_others", "seeds_of", "signed_distance"]
+__all__ = [
+    "Seeds", "ViewEvidence", "average", "classes_on_grid", "cut_face_band", "gather", "grown", "means_of_others",
+    "seeds_of", "signed_distance",
+]
 
 STRIDE = 3  # rays are cast for every third pixel: outlines of occluders are no better than that
 OCCLUDER_ERROR = 0.5  # share of the outline error by which occluders are grown
 PRIOR = 0.5  # nats for each outline error that a pixel lies inside the outline so far
 PRIOR_REACH = 3.0  # outline errors
 LEAST_TRUST = 0.15
+PARALLAX_CAP = 1.5  # nats from colours that agree, or not, between views
+LEAST_PARALLAX = 500  # pixels to learn that from
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +35,7 @@ class Seeds:
     inside: np.ndarray  # bool (rows, cols)
     outside: np.ndarray
     distance: np.ndarray  # mm, positive inside the outline so far
+    belief: np.ndarray  # how far inside, in errors of the outline
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +63,7 @@ def grown(mask: np.ndarray, by: float, pixel: float) -> np.ndarray:
 def seeds_of(
     mask: np.ndarray, beyond: np.ndarray, forbidden: np.ndarray, error: float, margin: float, pixel: float
 ) -> Seeds:
-    """Hard seeds: the eroded outline is inside, what is far out is outside, as is what constraints or other boards take.
+    """Hard seeds: the eroded outline is inside; what is far out, or taken by constraints or other boards, is outside.
 
     `beyond` counts as inside for the erosion: the outline stops there for certain.
     """
@@ -66,7 +72,8 @@ def seeds_of(
     depth = min(error, 0.5 * float(distance.max()))
     outside = (distance < -margin) & ~_hull(mask)
     outside[[0, -1]], outside[:, [0, -1]] = True, True
-    return Seeds((settled > depth) & mask & ~forbidden, outside | forbidden, distance)
+    return Seeds((settled > depth) & mask & ~forbidden, outside | forbidden, distance,
+                 _belief(distance, mask, error, margin, pixel))
 
 
 def _hull(mask: np.ndarray) -> np.ndarray:
@@ -94,7 +101,7 @@ def classes_on_grid(
 
 
 def cut_face_band(mask: np.ndarray, board_view: BoardView, grid: Grid) -> np.ndarray:
-    """Where the board's own cut faces show, or its far side would: the slab's shadow on its near plane, less the face itself."""
+    """Where the board's own cut faces would show: the slab's shadow on its near plane, less the face itself."""
     import cv2
 
     height, thickness = abs(board_view.eye[2] - board_view.near), abs(board_view.near - board_view.far)
@@ -122,17 +129,33 @@ def gather(
     outside = {kind: _learn(lab[beyond & (kinds == kind)], options, rng) for kind in (CLEAR, BOARD)}
     if inside is None:
         return None
+    inside = with_shade(inside)
     ask = seen & ~seeds.outside & ~seeds.inside
+    apart = ((lab - others) ** 2).sum(2)
     nats, weight = np.zeros(seen.shape, np.float32), np.zeros(seen.shape, np.float32)
     for kind, other in ((CLEAR, BOARD), (BOARD, CLEAR)):
         model = outside[kind] or outside[other]
         pixels = ask & (kinds == kind)
-        nats[pixels] = _log_ratio(inside, model, lab[pixels], options.evidence_cap, others[pixels])
-        weight[pixels] = 1.0 if kind == CLEAR else options.wood_share
+        share = 1.0 if kind == CLEAR else options.wood_share
+        told = _log_ratio(inside, model, lab[pixels], options.evidence_cap, others[pixels])
+        same = _parallax_ratio(apart[pixels], apart[seen & seeds.inside], apart[beyond & (kinds == kind)])
+        nats[pixels], weight[pixels] = share * told + same, 1.0
     # where the board's own cut face would show, wood says nothing; anything else still says outside
     weight[band & (nats > 0)] = 0
     trust = _trust(inside, outside[CLEAR] or outside[BOARD], lab, seen & seeds.inside, beyond, options.evidence_cap)
-    return ViewEvidence(nats, weight * trust, seen)
+    return ViewEvidence(nats * trust, weight, seen)
+
+
+def _parallax_ratio(apart: np.ndarray, inside: np.ndarray, outside: np.ndarray) -> np.ndarray:
+    """Nats for inside from how far a pixel's colour is from the other views', learnt where in and out are known."""
+    bins = np.r_[-1, 2.0 ** np.arange(0, 10), np.inf]  # LAB units squared
+    counts = [np.histogram(a[np.isfinite(a)], bins)[0] for a in (inside, outside)]
+    if min(c.sum() for c in counts) < LEAST_PARALLAX:
+        return np.zeros(len(apart), np.float32)
+    shares = [(c + 0.02 * c.sum()) / c.sum() for c in counts]
+    ratio = np.clip(np.log(shares[0] / shares[1]), -PARALLAX_CAP, PARALLAX_CAP)
+    known = np.isfinite(apart)
+    return np.where(known, ratio[np.digitize(np.where(known, apart, 0), bins) - 1], 0).astype(np.float32)
 
 
 def _learn(colours: np.ndarray, options: SegmentOptions, rng: np.random.Generator) -> Mixture | None:
@@ -165,7 +188,7 @@ def means_of_others(labs: Sequence[np.ndarray], seen: Sequence[np.ndarray], side
 def _trust(
     inside: Mixture, outside: Mixture | None, lab: np.ndarray, core: np.ndarray, beyond: np.ndarray, cap: float
 ) -> float:
-    """How well a view tells its own training pixels apart, 0 to 1: a shadowed or glossy view must not outvote the rest."""
+    """How well a view tells its training pixels apart, 0 to 1: a shadowed or glossy view must not outvote the rest."""
     if outside is None:
         return LEAST_TRUST
     means = [_log_ratio(inside, outside, lab[m][:: max(1, int(m.sum()) // 2000)], cap).mean() if m.any() else 0.0
@@ -173,9 +196,17 @@ def _trust(
     return float(np.clip((means[0] - means[1]) / cap, LEAST_TRUST, 1.0))
 
 
-def average(evidences: Sequence[ViewEvidence], seeds: Seeds, error: float) -> np.ndarray:
+def average(evidences: Sequence[ViewEvidence], seeds: Seeds) -> np.ndarray:
     """Nats for inside over all views, and what the outline so far says."""
     total = sum(e.nats * e.weight for e in evidences)
     weight = sum(e.weight for e in evidences)
-    said = np.where(weight > 0, total / np.maximum(weight, 1e-6), 0)
-    return said + PRIOR * np.clip(seeds.distance / error, -PRIOR_REACH, PRIOR_REACH)
+    return np.where(weight > 0, total / np.maximum(weight, 1e-6), 0) + PRIOR * seeds.belief
+
+
+def _belief(distance: np.ndarray, mask: np.ndarray, error: float, margin: float, pixel: float) -> np.ndarray:
+    """Outline errors inside the outline so far, capped; 0 in bays and holes that may just be missing from the cloud."""
+    from scipy.ndimage import binary_fill_holes
+
+    closed = binary_fill_holes(grown(grown(mask, margin, pixel), -margin, pixel))
+    believed = np.clip(distance / error, -PRIOR_REACH, PRIOR_REACH)
+    return np.where(closed & ~mask, 0, believed).astype(np.float32)

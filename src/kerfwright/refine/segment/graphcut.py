@@ -1,4 +1,4 @@
-"""The binary labelling of least energy (paper, Joint Image-Based Segmentation): data term and contrast-sensitive smoothness."""
+"""The labelling of least energy, by data term and contrast-sensitive smoothness (paper, Image-Based Segmentation)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def contrast(lab: np.ndarray, inside: np.ndarray) -> np.ndarray:
 
 
 def smoothness_weights(contrasts: np.ndarray, crossing: np.ndarray, smoothness: float) -> np.ndarray:
-    """(4, rows, cols) cost of a label change, from the contrast averaged over views; nothing across a constraint segment."""
+    """(4, rows, cols) cost of a label change, by the contrast averaged over views; none across a constraint."""
     weights = smoothness * SHARE * np.exp(-contrasts) * np.array(LENGTH)[:, None, None]
     weights[crossing] = 0
     return weights

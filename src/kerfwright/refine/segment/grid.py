@@ -1,15 +1,14 @@
-"""The raster of a board's plane: pixel (row, col) lies at origin + (col + 1/2, row + 1/2) * pixel, so that rows grow with y."""
+"""The raster of a board's plane: pixel (row, col) lies at origin + (col + 1/2, row + 1/2) * pixel; rows grow with y."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from shapely.geometry import MultiPolygon, Polygon
 
 __all__ = ["Grid", "grid_over"]
-
-SUBPIXEL_BITS = 6  # cv2.fillPoly takes fixed-point corners
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +27,7 @@ class Grid:
         return np.stack(np.meshgrid(x, y), axis=-1)
 
     def affine(self, rows: np.ndarray) -> np.ndarray:
-        """(k, rows, columns) float32 values of k affine functions a x + b y + c, given as (k, 3): quicker than a product."""
+        """(k, rows, columns) float32 values of k affine functions a x + b y + c, given as (k, 3)."""
         height, width = self.shape
         x = self.origin[0] + (np.arange(width) + 0.5) * self.pixel
         y = self.origin[1] + (np.arange(height) + 0.5) * self.pixel
@@ -44,19 +43,9 @@ class Grid:
         return self.origin + (column_row + 0.5) * self.pixel
 
     def mask(self, region: Polygon | MultiPolygon) -> np.ndarray:
-        """True where the pixel centre is inside the region (to 1/64 pixel)."""
-        import cv2
-
-        canvas = np.zeros(self.shape, np.uint8)
-        for polygon in getattr(region, "geoms", [region]):
-            rings = [self._fixed(ring) for ring in (polygon.exterior, *polygon.interiors) if not ring.is_empty]
-            if rings:
-                cv2.fillPoly(canvas, rings, 1, lineType=cv2.LINE_8, shift=SUBPIXEL_BITS)
-        return canvas.astype(bool)
-
-    def _fixed(self, ring) -> np.ndarray:
-        index = self.to_index(np.asarray(ring.coords)[:, :2])
-        return np.round(index * (1 << SUBPIXEL_BITS)).astype(np.int32).reshape(-1, 1, 2)
+        """True where the pixel centre is inside the region."""
+        shapely.prepare(region)
+        return shapely.contains_xy(region, *np.moveaxis(self.centres(), 2, 0))
 
     def lookup(self, values: np.ndarray, xy: np.ndarray, outside) -> np.ndarray:
         """The raster's value at (N, 2) points, by nearest pixel; `outside` beyond its edge."""
@@ -69,7 +58,7 @@ class Grid:
 
 def grid_over(region: Polygon, margin: float, pixel: float, max_pixels: int) -> Grid:
     """A raster over the region's bounding box and a margin, of at most `max_pixels` pixels."""
-    low, high = np.array(region.bounds).reshape(2, 2) + [[-margin], [margin]]
+    low, high = np.array(region.bounds).reshape(2, 2) + np.array([[-margin], [margin]])
     pixel = max(pixel, float(np.sqrt(np.prod(high - low) / max_pixels)))
     columns, rows = np.ceil((high - low) / pixel).astype(int)
     return Grid(low, pixel, (int(rows), int(columns)))

@@ -24,10 +24,10 @@ class SegmentOptions:
     min_slant: float = 0.2  # cosine between line of sight and sheet normal below which a view is too grazing
     outline_error: float = 8.0  # a rough outline is taken to be true to this: what is further in or out is known
     search_margin: float = 24.0  # how far beyond the rough outline the board may reach
-    contact_reach: float = 60.0  # a board known to touch another may be missing up to there: it is dark in corners
+    contact_reach: float = 250.0  # a board known to touch another may be missing up to there: it is dark in corners
     refined_error: float = 4.0  # the same, of a mask after the first round
     components: int = 5  # of a colour mixture
-    samples: int = 2500  # pixels that a colour mixture is trained on
+    samples: int = 1500  # pixels that a colour mixture is trained on
     evidence_cap: float = 4.0  # one view says no more than this about one pixel
     wood_share: float = 0.35  # weight of colour where another board is what would show: wood beside wood
     smoothness: float = 3.0

@@ -44,8 +44,10 @@ def _shrunk(image: np.ndarray, shrink: int) -> np.ndarray:
     return cv2.resize(image[: size[1] * shrink, : size[0] * shrink], size, interpolation=cv2.INTER_AREA)
 
 
-def pixels_at(sheet: Sheet, view: View, xy: np.ndarray, z: float | np.ndarray, shift: np.ndarray | None = None) -> np.ndarray:
-    """(N, 2) photo pixels of (N, 2) board points at height z. `shift` (2,) mm is what a disagreeing view is moved by."""
+def pixels_at(
+    sheet: Sheet, view: View, xy: np.ndarray, z: float | np.ndarray, shift: np.ndarray | None = None
+) -> np.ndarray:
+    """(N, 2) photo pixels of (N, 2) board points at height z; a disagreeing view is moved by `shift` (2,) mm."""
     at = xy if shift is None else xy + shift
     return view.project(sheet.to_world(np.column_stack([at, np.broadcast_to(z, len(at))])))[0]
 

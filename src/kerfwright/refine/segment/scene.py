@@ -1,4 +1,4 @@
-"""Which surface a photograph sees at a point of a board's plane: ray casting against the other boards and the ground."""
+"""What a photograph sees at a point of a board's plane: ray casting against the other boards and the ground."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ def slab_mesh(region: Polygon, thickness: float) -> tuple[np.ndarray, np.ndarray
     for ring in (region.exterior, *region.interiors):
         xy = np.asarray(ring.coords)[:, :2]
         a, b = xy[:-1], xy[1:]
-        low_a, low_b, high_a, high_b = (np.column_stack([p, np.full(len(p), z)]) for z in (0.0, thickness) for p in (a, b))
+        heights = [(p, np.full(len(p), z)) for z in (0.0, thickness) for p in (a, b)]
+        low_a, low_b, high_a, high_b = (np.column_stack(h) for h in heights)
         corners += list(np.stack([low_a, low_b, high_b], 1)) + list(np.stack([low_a, high_b, high_a], 1))
     vertices = np.concatenate(corners)
     return vertices, np.arange(len(vertices)).reshape(-1, 3)
@@ -41,7 +42,7 @@ class Occluders:
         self._scenes = [_scene([m for j, ms in enumerate(meshes) if j != i for m in ms]) for i in range(len(sheets))]
 
     def classify(self, board_idx: int, view: View, x_in_world: np.ndarray) -> np.ndarray:
-        """(N,) CLEAR, BOARD or OCCLUDED for points on the board's plane as seen in a view, the board itself taken away."""
+        """(N,) CLEAR, BOARD or OCCLUDED for points on the board's plane in a view, the board itself taken away."""
         import open3d as o3d
 
         scene, ground_id = self._scenes[board_idx]

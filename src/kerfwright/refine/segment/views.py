@@ -1,8 +1,8 @@
 """Which photographs to read for a board.
 
-A sheet plane seen at a slant shows one sheet face whole, and round it, for every stretch of the cut path, either the cut face (where
-the camera stands outside that stretch) or what lies behind the board. The photographs are therefore picked together, so that each
-stretch of the boundary is a silhouette in some of them, and both faces are seen.
+A sheet plane seen at a slant shows one sheet face whole, and round it, for every stretch of the cut path, either the
+cut face (where the camera stands outside that stretch) or what lies behind the board. The photographs are therefore
+picked together, so that each stretch of the boundary is a silhouette in some of them, and both faces are seen.
 """
 
 from __future__ import annotations
@@ -69,7 +69,8 @@ def choose_views(
         if seen is None:
             continue
         board_view, shown = seen
-        slant = abs(board_view.eye[2] - board_view.near) / np.linalg.norm(board_view.eye - [*inner.mean(0), board_view.near])
+        sight = board_view.eye - [*inner.mean(0), board_view.near]
+        slant = abs(sight[2]) / np.linalg.norm(sight)
         if board_view.share < options.min_visible or slant < options.min_slant:
             continue
         edge = _edges_seen(sheet, board_idx, board_view, ring, normals, occluders)

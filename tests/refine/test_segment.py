@@ -1,0 +1,340 @@
+"""Segmentation of boards in photographs: parts on made-up rasters and profiles, the whole on the tiny capture."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from shapely.geometry import Polygon, box
+
+from kerfwright.assemble.types import ConstraintSegment
+from kerfwright.capture.camera import Camera
+from kerfwright.capture.types import View
+from kerfwright.errors import OptionError
+from kerfwright.identify.types import Sheet
+from kerfwright.model import Quantity
+from kerfwright.refine.segment import SegmentOptions, segment_boards
+from kerfwright.refine.segment.appearance import fit_mixture, same_surface, with_shade
+from kerfwright.refine.segment.boundary import Chain, chain_of, registration, snap
+from kerfwright.refine.segment.constraints import carve, fill_to_contacts, limits_of
+from kerfwright.refine.segment.edges import PITCH, EdgeScan, trace, view_offsets
+from kerfwright.refine.segment.evidence import cut_face_band, signed_distance
+from kerfwright.refine.segment.graphcut import cut, smoothness_weights
+from kerfwright.refine.segment.grid import Grid, grid_over
+from kerfwright.refine.segment.scene import BOARD, CLEAR, OCCLUDED, Occluders, slab_mesh
+from kerfwright.refine.segment.topology import clean, pieces
+from kerfwright.refine.segment.views import BoardView
+
+GRID = Grid(np.array([-20.0, -20.0]), 1.0, (60, 80))
+
+
+def segment(start, end, **more) -> ConstraintSegment:
+    return ConstraintSegment(np.array(start, float), np.array(end, float), more.pop("origin", "contact"), 0.2, **more)
+
+
+def sheet(region: Polygon, z: float = 100.0, thickness: float = 10.0) -> Sheet:
+    pose = np.eye(4)
+    pose[2, 3] = z
+    none = np.zeros(0, int)
+    return Sheet("b", pose, Quantity(value=thickness), True, region, none, none, none)
+
+
+def looking_down(x: float, y: float, z: float) -> View:
+    pose = np.diag([1.0, -1.0, -1.0, 1.0])
+    pose[:3, 3] = -pose[:3, :3] @ [x, y, z]
+    return View("v", "v.png", Camera("PINHOLE", 400, 400, (400.0, 400.0, 200.0, 200.0)), pose)
+
+
+# --- raster ---
+
+
+def test_grid_mask_holds_the_pixels_whose_centres_are_inside() -> None:
+    region = box(-5.2, 0.3, 30.4, 10.1).difference(box(5.2, 2.3, 9.7, 6.9))
+    want = shapely.contains_xy(region, GRID.centres().reshape(-1, 2)).reshape(GRID.shape)
+    assert (GRID.mask(region) != want).sum() <= 0.02 * want.sum()
+
+
+def test_grid_lookup_and_index_agree() -> None:
+    values = np.arange(60 * 80).reshape(60, 80)
+    xy = GRID.centres()[7, 11][None]
+    assert GRID.lookup(values, xy, -1)[0] == values[7, 11]
+    assert np.allclose(GRID.to_index(xy), [[11, 7]])
+    assert GRID.lookup(values, np.array([[1e3, 0]]), -1)[0] == -1
+
+
+def test_grid_never_exceeds_its_limit() -> None:
+    grid = grid_over(box(0, 0, 3000, 2000), 10, 0.5, 100_000)
+    assert np.prod(grid.shape) <= 101_000
+
+
+def test_smoothed_piece_keeps_size_and_hole() -> None:
+    mask = GRID.mask(box(-10, -10, 40, 20).difference(box(0, 0, 12, 10)))
+    piece = pieces(mask, GRID)
+    assert len(piece.interiors) == 1
+    assert piece.area == pytest.approx(50 * 30 - 120, rel=0.01)
+
+
+def test_specks_go_and_holes_stay() -> None:
+    mask = GRID.mask(box(-10, -10, 40, 30).difference(box(0, 0, 12, 10)))
+    mask[15, 15], mask[55, 75] = False, True
+    found = clean(mask, 1.0, SegmentOptions())
+    assert len(found) == 1
+    assert not found[0][55, 75]
+    assert found[0][15, 15]
+    assert not found[0][25, 25]
+
+
+def test_two_pieces_stay_two() -> None:
+    mask = GRID.mask(box(-15, -15, 10, 30)) | GRID.mask(box(20, -15, 50, 30))
+    found = clean(mask, 1.0, SegmentOptions())
+    assert [m.sum() for m in found] == sorted((m.sum() for m in found), reverse=True)
+    assert len(found) == 2
+
+
+# --- constraints ---
+
+
+def test_excluded_side_is_the_right_of_a_segment() -> None:
+    excluded, crossing = carve(limits_of([segment((10, -5), (10, 15))], 10, 20), GRID)
+    x, y = np.moveaxis(GRID.centres(), 2, 0)
+    assert (excluded == ((x > 10) & (y > -5) & (y < 15))).all()
+    assert crossing[0].sum() == 20  # one step right a row
+
+
+def test_exclusion_ends_at_material_on_the_far_side() -> None:
+    left, right = segment((10, -5), (10, 15)), segment((26, 15), (26, -5))
+    excluded, _ = carve(limits_of([left, right], 10, 5), GRID)
+    x, y = np.moveaxis(GRID.centres(), 2, 0)
+    assert (excluded == ((x > 10) & (x < 26) & (y > -5) & (y < 15))).all()
+
+
+def test_open_corner_is_closed() -> None:
+    up, across = limits_of([segment((30, -10), (30, 12)), segment((25, 20), (-10, 20))], 10, 20)
+    assert np.allclose(up.end, (30, 20))
+    assert np.allclose(across.start, (30, 20))
+
+
+def test_slanted_segment_moves_to_the_widest_height() -> None:
+    normal = np.array([np.sqrt(0.5), 0, -np.sqrt(0.5)])  # leans outward going up
+    (limit,) = limits_of([segment((10, 0), (10, 20), normal=normal, depth=0.0)], 8.0, 20)
+    assert limit.start[0] == pytest.approx(18)
+
+
+def test_pointed_end_stops_at_the_point() -> None:
+    up, down = (np.array([np.sqrt(0.5), 0, s * np.sqrt(0.5)]) for s in (-1, 1))
+    limits = limits_of([segment((10, 0), (10, 20), normal=up, depth=0.0),
+                        segment((10, 0), (10, 20), normal=down, depth=8.0)], 8.0, 20)
+    assert [limit.start[0] for limit in limits] == pytest.approx([14, 14], abs=0.1)
+
+
+def test_board_is_run_on_to_its_contact_only() -> None:
+    mask = GRID.mask(box(-10, -10, 20, 20))
+    contact, cut_plane = segment((40, -5), (40, 15)), segment((-15, 15), (-15, -5), origin="cut_plane")
+    filled = fill_to_contacts(mask, limits_of([contact, cut_plane], 10, 5), GRID, 60)
+    assert (filled == mask | GRID.mask(box(19, -5, 40, 15))).all()
+
+
+# --- scene ---
+
+
+def test_slab_mesh_is_closed() -> None:
+    import open3d as o3d
+
+    region = box(0, 0, 40, 30).difference(box(10, 10, 20, 20))
+    vertices, triangles = slab_mesh(region, 5.0)
+    scene = o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(vertices.astype(np.float32), triangles.astype(np.uint32))
+    points = np.array([[5, 5, 2], [15, 15, 2], [50, 5, 2], [5, 5, 6]], np.float32)
+    assert scene.compute_occupancy(points).numpy().tolist() == [1, 0, 0, 0]
+
+
+def test_what_lies_before_and_behind_a_plane() -> None:
+    boards = [sheet(box(-50, -50, 50, 50), 100), sheet(box(-50, -50, 0, 50), 40), sheet(box(30, -50, 50, 50), 300)]
+    occluders = Occluders(boards, [[b.region] for b in boards])
+    points = np.array([[-20.0, 0, 110], [10, 0, 110], [25, 0, 110]])
+    kinds = occluders.classify(0, looking_down(0, 0, 500), points)
+    assert kinds.tolist() == [BOARD, CLEAR, CLEAR]
+    assert occluders.classify(0, looking_down(60, 0, 500), points[2:]).tolist() == [OCCLUDED]
+
+
+def test_cut_face_shows_on_the_side_of_the_camera() -> None:
+    mask = GRID.mask(box(-10, -10, 30, 20))
+    eye = np.array([55.0, 5.0, 40.0])
+    view = BoardView(looking_down(0, 0, 500), 0, 10.0, 0.0, eye, 1.0, 1.0)
+    band = cut_face_band(mask, view, GRID)
+    row = np.flatnonzero(band[25])
+    want = 30 + (55 - 30) * (1 - 30 / 40)  # the far edge, seen on the near plane
+    assert GRID.to_xy(np.array([row.min(), 0]))[0] == pytest.approx(30.5, abs=1)
+    assert GRID.to_xy(np.array([row.max(), 0]))[0] == pytest.approx(want, abs=1)
+
+
+# --- appearance and cut ---
+
+
+def test_mixture_tells_two_colours_apart() -> None:
+    rng = np.random.default_rng(1)
+    wood, floor = (rng.normal(m, 3, (5000, 3)).astype(np.float32) for m in ([70, 8, 25], [50, 0, 0]))
+    inside, outside = (fit_mixture(c, 5, 2000, rng) for c in (wood, floor))
+    ratio = inside.log_density(wood) - outside.log_density(wood)
+    assert (ratio > 3).mean() > 0.99
+    assert np.isfinite(outside.log_density(np.array([[1000.0, 0, 0]]))).all()
+
+
+def test_shade_is_likelier_inside_with_shade() -> None:
+    rng = np.random.default_rng(1)
+    lit = fit_mixture(rng.normal([70, 8, 25], 2, (3000, 3)), 5, 2000, rng)
+    dark = np.array([[86 * 0.75 - 16, 8 * 0.75, 25 * 0.75]])
+    assert with_shade(lit).log_density(dark)[0] > lit.log_density(dark)[0] + 2
+
+
+def test_too_few_colours_make_no_mixture() -> None:
+    assert fit_mixture(np.zeros((3, 3)), 5, 100, np.random.default_rng(0)) is None
+
+
+def test_agreeing_colours_are_one_surface() -> None:
+    same, other, alone = same_surface(np.full((3, 3), 50.0), np.array([[51.0, 50, 50], [70, 50, 50], [np.nan] * 3]))
+    assert same > other + 5
+    assert alone == -np.inf
+
+
+def test_cut_follows_evidence_seeds_and_constraints() -> None:
+    x, y = np.moveaxis(GRID.centres(), 2, 0)
+    evidence = np.where(x < 20, 1.0, -1.0)
+    excluded, crossing = carve(limits_of([segment((-10, -10), (30, -10))], 10, 5), GRID)
+    weights = smoothness_weights(np.zeros((4, *GRID.shape)), crossing, 3.0)
+    inside = (abs(x) < 3) & (abs(y) < 3)
+    mask = cut(evidence, weights, inside, excluded | (x < -18))
+    assert mask[inside].all()
+    assert not mask[excluded].any()
+    assert mask[(x > -16) & (x < 19) & (y > -9)].all()
+    assert not mask[x > 21].any()
+
+
+# --- boundary ---
+
+
+def ring_chain(radius: float = 50.0, count: int = 300) -> Chain:
+    angle = np.arange(count) / count * 2 * np.pi
+    normals = np.column_stack([np.cos(angle), np.sin(angle)])
+    return Chain(radius * normals, normals, np.zeros(count, int))
+
+
+def scan_at(offset: np.ndarray, strength: float = 20.0) -> EdgeScan:
+    offsets = np.arange(-4, 4 + PITCH / 2, PITCH)
+    return EdgeScan(strength * np.exp(-((offsets - offset[:, None]) / 0.7) ** 2), np.ones(len(offset)), offsets)
+
+
+def test_trace_and_peak_find_an_edge_between_samples() -> None:
+    chain = ring_chain()
+    true = 0.37 + 0.5 * np.sin(2 * np.arctan2(*chain.normals.T))
+    scan = scan_at(true)
+    offset, weight = view_offsets(scan, trace([scan], chain.ring))
+    assert (weight > 0).all()
+    assert abs(offset - true).max() < 0.03
+
+
+def test_one_view_with_an_edge_elsewhere_is_outvoted() -> None:
+    chain = ring_chain()
+    still = np.zeros(len(chain.ring))
+    path = trace([scan_at(still), scan_at(still), scan_at(still + 2.5, 60.0)], chain.ring)
+    assert abs(path).max() <= PITCH
+
+
+def test_registration_recovers_a_moved_view() -> None:
+    chain, shift = ring_chain(), np.array([0.9, -0.6])
+    still = np.zeros(len(chain.ring))
+    scans = [scan_at(still), scan_at(still), scan_at(still), scan_at(chain.normals @ shift)]
+    shifts, remains = registration(chain, scans)
+    assert np.linalg.norm(shifts[3] - shift) < 0.3 * np.linalg.norm(shift)  # the poses' own say holds it back
+    assert abs(shifts[:3]).max() < 0.05
+    assert np.nanmax(remains) < 0.2
+
+
+def test_chain_runs_round_material_on_the_left() -> None:
+    chain = chain_of(box(0, 0, 60, 40).difference(box(20, 10, 40, 30)), 1.0)
+    material = box(0, 0, 60, 40).difference(box(20, 10, 40, 30)).buffer(0.2)
+    assert not shapely.contains_xy(material, chain.moved(np.full(len(chain.points), 1.0))).any()
+    outer, hole = (Polygon(chain.points[chain.ring == k]) for k in (0, 1))
+    assert outer.exterior.is_ccw
+    assert not hole.exterior.is_ccw
+
+
+def test_snap_takes_the_segments_place_and_error() -> None:
+    limits = limits_of([segment((60, 0), (60, 40))], 10, 5)
+    chain = chain_of(box(0, 0, 61, 40), 1.0)
+    points, error = snap(chain.points, np.full(len(chain.points), 0.5), chain.normals, limits, 2.0)
+    on = (chain.normals[:, 0] > 0.9)
+    assert np.allclose(points[on, 0], 60)
+    assert (error[on] == 0.2).all()
+    assert (error[chain.normals[:, 0] < 0] == 0.5).all()
+
+
+def test_signed_distance_is_zero_on_the_boundary() -> None:
+    distance = signed_distance(GRID.mask(box(-10, -10, 40, 20)), 1.0)
+    assert distance[30, 40] > 8
+    assert distance[25, 59] == pytest.approx(0.5)
+    assert distance[25, 60] == pytest.approx(-0.5)
+
+
+# --- the whole ---
+
+
+@pytest.fixture(scope="module")
+def tiny():
+    """The tiny capture with rough boards: true poses, outlines wrong by some millimetres."""
+    from kerfwright.synthetic import tiny_assembly, tiny_capture
+
+    capture, model = tiny_capture(), tiny_assembly()
+    sheets, truths = [], []
+    for board in model.boards:
+        outline = Polygon([e.start for e in board.cut_path.outer.edges])
+        none = np.zeros(0, int)
+        pose = np.array(board.model_from_board)
+        sheets.append(Sheet(board.name, pose, board.thickness, True, outline.buffer(-5), none, none, none))
+        truths.append(outline)
+    return capture, sheets, truths
+
+
+def iou(a: Polygon, b: Polygon) -> float:
+    return a.intersection(b).area / a.union(b).area
+
+
+def test_photographs_put_a_shrunk_outline_right(tiny) -> None:
+    capture, sheets, truths = tiny
+    result = segment_boards(sheets, [[], [], []], capture)[0]
+    (outline,) = result.outlines
+    assert result.fallback is None
+    assert outline.origin == "images"
+    assert iou(truths[0], Polygon(outline.loops[0].points)) > max(0.97, iou(truths[0], sheets[0].region))
+    assert np.isfinite(outline.loops[0].standard_error).all()
+    assert (outline.loops[0].standard_error > 0).all()
+
+
+def test_same_bytes_whatever_the_threads(tiny) -> None:
+    capture, sheets, _ = tiny
+    runs = [segment_boards(sheets, [[], [], []], capture, SegmentOptions(threads=n)) for n in (1, 3)]
+    for a, b in zip(*runs, strict=True):
+        assert a.outlines[0].loops[0].points.tobytes() == b.outlines[0].loops[0].points.tobytes()
+
+
+def test_without_photographs_the_cloud_outline_stays_and_says_so(tiny) -> None:
+    capture, sheets, _ = tiny
+    results = segment_boards(sheets, [[], [], []], capture, SegmentOptions(use_images=False))
+    for rough, result in zip(sheets, results, strict=True):
+        assert result.outlines[0].origin == "cloud"
+        assert "not to be used" in result.fallback
+        assert iou(rough.region, Polygon(result.outlines[0].loops[0].points)) > 0.98
+
+
+def test_a_board_out_of_sight_falls_back(tiny) -> None:
+    capture, sheets, _ = tiny
+    below = np.array(sheets[0].world_from_board)
+    below[2, 3] = -500.0
+    result = segment_boards([replace(sheets[0], world_from_board=below)], [[]], capture)[0]
+    assert "no photograph" in result.fallback
+
+
+def test_constraints_must_match_the_sheets(tiny) -> None:
+    capture, sheets, _ = tiny
+    with pytest.raises(OptionError, match="constraints"):
+        segment_boards(sheets, [[]], capture)
