@@ -7,11 +7,11 @@ curve in space: what lies beside it does not matter. Wood grain, noise and the b
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from kerfwright.capture.types import Capture, View
 
@@ -54,7 +54,7 @@ class SweepResult:
     standard_error: float
     contrast: float  # best strength over the median strength
     views: int
-    view_strength: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    persistence: np.ndarray  # share of all stretches in all views that show an edge at each offset
 
 
 def sweep_edge(
@@ -104,14 +104,14 @@ def _view_curves(photos: Photos, k: int, grid: np.ndarray, own: np.ndarray, chun
 
 def _combine(slopes: np.ndarray, owners: list[int], offsets: np.ndarray) -> SweepResult:
     """Mean of the curves, each limited so that one strong background edge cannot outvote the rest."""
-    level = np.median(slopes)
-    limited = np.minimum(slopes / max(level, 1e-6), 12.0)
+    limited = _limited(slopes / max(np.median(slopes), 1e-6))
     strength = limited.mean(axis=0)
     inner = slice(2, len(offsets) - 2)
     k = 2 + int(np.argmax(strength[inner]))
     best = float(offsets[k] + refine_peak(strength[k - 1 : k + 2]) * (offsets[1] - offsets[0]))
     error = _standard_error(limited, owners, k, offsets)
-    return SweepResult(offsets, strength, best, error, float(strength[k] / np.median(strength)), len(set(owners)))
+    shown = (maximum_filter1d(limited, 3, axis=1) > 2.0).mean(axis=0)
+    return SweepResult(offsets, strength, best, error, float(strength[k] / np.median(strength)), len(set(owners)), shown)
 
 
 def refine_peak(y: np.ndarray) -> float:

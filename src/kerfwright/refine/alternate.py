@@ -1,19 +1,33 @@
-"""Outlines and assembly in turn, until no contact changes (paper, Overview: alternate optimisation)."""
+"""Outlines and assembly in turn (paper, Overview: alternate optimisation)."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from kerfwright.assemble import AssembleOptions, assemble
+from kerfwright.assemble.splits import SeamLine, find_seam_lines, seam_contact, seam_segments, split_sheet
 from kerfwright.assemble.types import Assembly
+from kerfwright.assemble.visibility import Obstacles
 from kerfwright.capture.types import Capture
-from kerfwright.identify.types import Parts
+from kerfwright.identify.photo_edges import Photos
+from kerfwright.identify.types import Parts, Sheet
 from kerfwright.refine.constrain import constrained_region, outline_region
 from kerfwright.refine.options import RefineOptions
 from kerfwright.refine.segment import SegmentOptions, segment_boards
 from kerfwright.refine.types import Outline
 
 __all__ = ["refined_assembly"]
+
+EXACT = AssembleOptions(outline_error=1 / 200, reach=1 / 60)  # outlines from photographs are this much better than the cloud's
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """A board after the photographs, the outline it came from, and the seam to the piece before it."""
+
+    sheet: Sheet
+    outline: Outline
+    seam: SeamLine | None = None
 
 
 def refined_assembly(
@@ -22,18 +36,47 @@ def refined_assembly(
     """One outline a board and the assembly found with them."""
     diameter = capture.cloud.diameter
     found = segment_boards(assembly.sheets, assembly.constraints, capture, SegmentOptions(use_images=options.use_images))
-    pieces = [
-        (sheet, segments, outline)
-        for sheet, segments, board in zip(assembly.sheets, assembly.constraints, found, strict=True)
-        for outline in board.outlines
-    ]
-    outlines = tuple(outline for _, _, outline in pieces)
-    sheets = []
-    for number, (sheet, segments, outline) in enumerate(pieces):
-        region = constrained_region(outline_region(outline), segments, diameter / 6, diameter / 20)
-        sheets.append(replace(sheet, name=f"board_{number + 1:02d}", region=region))
-    exact = AssembleOptions(outline_error=1 / 200, reach=1 / 60)
-    again = assemble(replace(parts, sheets=tuple(sheets)), capture, exact)
-    return outlines, again
+    pieces = []
+    for sheet, segments, board in zip(assembly.sheets, assembly.constraints, found, strict=True):
+        for outline in board.outlines:
+            region = constrained_region(outline_region(outline), segments, diameter / 6, diameter / 20)
+            pieces.append(_Piece(replace(sheet, region=region), outline))
+    if options.use_images:
+        pieces = _split(pieces, assembly, capture)
+    named = [replace(p, sheet=replace(p.sheet, name=f"board_{k + 1:02d}")) for k, p in enumerate(pieces)]
+    again = assemble(replace(parts, sheets=tuple(p.sheet for p in named)), capture, EXACT)
+    return tuple(p.outline for p in named), _with_seams(again, named)
 
 
+def _split(pieces: list[_Piece], assembly: Assembly, capture: Capture) -> list[_Piece]:
+    """Pieces with the boards that show seams taken apart."""
+    diameter, photos = capture.cloud.diameter, Photos(capture)
+    obstacles = Obstacles([p.sheet for p in pieces], diameter / 100)
+    out: list[_Piece] = []
+    for piece in pieces:
+        touching = _touching(piece.sheet.name, assembly)
+        seams = find_seam_lines(piece.sheet, touching, photos, obstacles, diameter)
+        if not seams:
+            out.append(piece)
+            continue
+        sheets = split_sheet(piece.sheet, seams, capture.cloud.points)
+        out += [_Piece(s, piece.outline, seam) for s, seam in zip(sheets, [None, *seams], strict=True)]
+    return out
+
+
+def _touching(name: str, assembly: Assembly) -> list[Sheet]:
+    names = {c.a if c.b == name else c.b for c in assembly.contacts if name in (c.a, c.b)}
+    return [s for s in assembly.sheets if s.name in names]
+
+
+def _with_seams(assembly: Assembly, pieces: list[_Piece]) -> Assembly:
+    """The assembly with a contact and constraint segments for every seam between neighbouring pieces."""
+    contacts, constraints = list(assembly.contacts), [list(c) for c in assembly.constraints]
+    for k, piece in enumerate(pieces):
+        if piece.seam is None:
+            continue
+        before, after = seam_segments(piece.seam, len(contacts))
+        constraints[k - 1].append(before)
+        constraints[k].append(after)
+        contacts.append(seam_contact(assembly.sheets[k - 1], assembly.sheets[k], piece.seam))
+    return replace(assembly, contacts=tuple(contacts), constraints=tuple(tuple(c) for c in constraints))

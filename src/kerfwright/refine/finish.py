@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
@@ -11,6 +12,7 @@ from kerfwright.assemble.types import Assembly, ConstraintSegment
 from kerfwright.capture.types import Capture
 from kerfwright.errors import StageError
 from kerfwright.model import Board, CutPath, Finding, Line, Loop
+from kerfwright.model.geometry import edge_length
 from kerfwright.refine.boards import to_board
 from kerfwright.refine.constrain import constrained_region, to_loops
 from kerfwright.refine.curves import fit_curves
@@ -18,6 +20,8 @@ from kerfwright.refine.options import Refined, RefineOptions
 from kerfwright.refine.types import BoundaryLoop, Outline
 
 __all__ = ["finished"]
+
+SHORTEST = 1e-3  # mm; OCCT makes no edge of less
 
 
 def finished(outlines: tuple[Outline, ...], assembly: Assembly, capture: Capture, options: RefineOptions) -> Refined:
@@ -46,14 +50,17 @@ def _cut_path(
     """The fitted cut path; a polygon, and a note that says so, for a boundary too rough to fit."""
     try:
         fit = fit_curves(loops, segments)
-        return fit.path, fit.notes
     except StageError as error:
         return polygon_path(region, tolerance), (f"the cut path is a plain polygon: {error}",)
+    short = [e for loop in (fit.path.outer, *fit.path.holes) for e in loop.edges if edge_length(e) < SHORTEST]
+    if short:
+        return polygon_path(region, tolerance), (f"the cut path is a plain polygon: {len(short)} fitted edges have no length",)
+    return fit.path, fit.notes
 
 
 def polygon_path(region: Polygon, tolerance: float) -> CutPath:
     """A polygon's rings as lines, simplified to a tolerance in mm."""
-    plain = orient(region.simplify(tolerance).buffer(0))
+    plain = orient(shapely.set_precision(region.simplify(tolerance), 10 * SHORTEST).buffer(0))
     plain = max(getattr(plain, "geoms", [plain]), key=lambda p: p.area)
     loops = []
     for ring in (plain.exterior, *plain.interiors):

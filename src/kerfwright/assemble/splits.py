@@ -1,0 +1,160 @@
+"""Boards glued edge to edge: seams that run right across a region seen as one board (method.md; a limit the paper names).
+
+A seam is a straight line across the whole board at which the colours step, in every stretch of it and in every view. Grain wanders, knots
+and shadows are short, and an edge where another board stands on this one is already known. Precision before recall.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from shapely.geometry import Polygon
+
+from kerfwright.assemble.types import ConstraintSegment
+from kerfwright.assemble.visibility import Obstacles
+from kerfwright.identify.photo_edges import Photos, sweep_edge
+from kerfwright.identify.types import Sheet
+from kerfwright.model import Contact, ContactEvidence
+
+__all__ = ["SeamLine", "find_seam_lines", "seam_contact", "seam_segments", "split_sheet"]
+
+LEAST_STRENGTH = 3.5  # of a seam, in units of the face's own texture
+LEAST_PERSISTENCE = 0.6  # share of all stretches in all views that show it
+LEAST_VIEWS = 4
+MOST_VIEWS = 6
+NARROWEST = 1 / 10  # of D; narrower strips are shadows and edges more often than boards
+
+
+@dataclass(frozen=True, eq=False)
+class SeamLine:
+    """The line m.xy = offset across a board, board frame mm, from start to end."""
+
+    m: np.ndarray
+    offset: float
+    start: np.ndarray
+    end: np.ndarray
+    strength: float
+    views: int
+
+
+def find_seam_lines(sheet: Sheet, touching: list[Sheet], photos: Photos, obstacles: Obstacles, diameter: float) -> list[SeamLine]:
+    """Seams across a board in the direction that shows the strongest one, in order along it."""
+    ring = np.asarray(sheet.region.minimum_rotated_rectangle.exterior.coords)
+    first = (ring[1] - ring[0]) / np.linalg.norm(ring[1] - ring[0])
+    found = [
+        _seams_across(sheet, m, face, touching, photos, obstacles, diameter)
+        for m in (first, np.array([-first[1], first[0]])) for face in ("top", "bottom")
+    ]
+    best = max(found, key=lambda seams: max((s.strength for s in seams), default=0.0))
+    return sorted(best, key=lambda s: s.offset)
+
+
+def _seams_across(
+    sheet: Sheet, m: np.ndarray, face: str, touching: list[Sheet], photos: Photos, obstacles: Obstacles, diameter: float
+) -> list[SeamLine]:
+    tangent = np.array([-m[1], m[0]])
+    ring = np.asarray(sheet.region.exterior.coords)[:, :2]
+    across, along = ring @ m, ring @ tangent
+    margin = NARROWEST * diameter
+    if np.ptp(across) < 2.5 * margin or np.ptp(along) < margin:
+        return []
+    inner = 0.06 * np.ptp(along)
+    at = np.arange(along.min() + inner, along.max() - inner, diameter / 160)
+    offsets = np.arange(across.min() + margin, across.max() - margin, diameter / 1000)
+    height = sheet.thickness.value if face == "top" else 0.0
+    outward = sheet.normal if face == "top" else -sheet.normal
+
+    def line(offset: float) -> np.ndarray:
+        return sheet.to_world(np.c_[offset * m + at[:, None] * tangent, np.full(len(at), height)])
+
+    levels = np.linspace(offsets[0], offsets[-1], 5)
+    visible = np.all([obstacles.visible(photos.views, line(level), outward, 0.35) for level in levels], axis=0)
+    visible[np.argsort(-visible.sum(axis=1), kind="stable")[MOST_VIEWS:]] = False
+    middle = float(offsets.mean())
+    sweep = sweep_edge(photos, line(middle), sheet.world_from_board[:3, :2] @ m, offsets - middle, visible, smoothing=diameter / 600)
+    if sweep is None or sweep.views < LEAST_VIEWS:
+        return []
+    strength = sweep.strength / np.median(sweep.strength)
+    known = _known_lines(sheet, m, touching)
+    ends = [along.min(), along.max()]
+    return [
+        SeamLine(m, float(offsets[k]), offsets[k] * m + ends[0] * tangent, offsets[k] * m + ends[1] * tangent, float(strength[k]), sweep.views)
+        for k in _peaks(strength, sweep.persistence, reach=round(margin / (offsets[1] - offsets[0])))
+        if all(abs(offsets[k] - other) > margin / 2 for other in known) and _crosses_all(sheet.region, m, offsets[k])
+    ]
+
+
+def _peaks(strength: np.ndarray, persistence: np.ndarray, reach: int) -> list[int]:
+    """Places that are strong, persistent, and the strongest within reach."""
+    good = np.flatnonzero((strength > LEAST_STRENGTH) & (persistence > LEAST_PERSISTENCE))
+    return [int(k) for k in good if strength[k] == strength[max(0, k - reach) : k + reach + 1].max()]
+
+
+def _known_lines(sheet: Sheet, m: np.ndarray, touching: list[Sheet]) -> list[float]:
+    """Offsets of the lines in which the sheet planes of touching boards cut this board."""
+    lines = []
+    for other in touching:
+        n = other.normal @ sheet.world_from_board[:3, :3]
+        flat = float(np.hypot(n[0], n[1]))
+        if flat < 0.2 or abs(n[:2] @ m) < 0.98 * flat:
+            continue
+        base = other.normal @ (other.world_from_board[:3, 3] - sheet.world_from_board[:3, 3])
+        sign = np.sign(n[:2] @ m)
+        for plane in (0.0, other.thickness.value):
+            lines += [sign * (base + plane - n[2] * z) / flat for z in (0.0, sheet.thickness.value)]
+    return lines
+
+
+def _crosses_all(region: Polygon, m: np.ndarray, offset: float) -> bool:
+    """Whether the line runs through wood all the way, not through a hole."""
+    return not any(
+        (np.asarray(hole.coords)[:, :2] @ m).min() < offset < (np.asarray(hole.coords)[:, :2] @ m).max() for hole in region.interiors
+    )
+
+
+def split_sheet(sheet: Sheet, seams: list[SeamLine], points: np.ndarray) -> list[Sheet]:
+    """The pieces of a board between its seams, each with its own cloud points ((N, 3) world, of the whole cloud)."""
+    bounds = [-np.inf, *(s.offset for s in seams), np.inf]
+    m = seams[0].m
+    tangent = np.array([-m[1], m[0]])
+    pieces = []
+    for below, above in pairwise(bounds):
+        low, high = np.clip([below, above], -1e5, 1e5)
+        strip = Polygon([a * m + b * tangent for a, b in ((low, -1e5), (high, -1e5), (high, 1e5), (low, 1e5))])
+        region = sheet.region.intersection(strip)
+        region = max(getattr(region, "geoms", [region]), key=lambda p: p.area)
+        own = [idx[_between(sheet, points[idx], m, low, high)] for idx in (sheet.top_idx, sheet.bottom_idx, sheet.cut_idx)]
+        pieces.append(replace(sheet, region=region, top_idx=own[0], bottom_idx=own[1], cut_idx=own[2]))
+    return pieces
+
+
+def _between(sheet: Sheet, points: np.ndarray, m: np.ndarray, low: float, high: float) -> np.ndarray:
+    across = sheet.to_board(points)[:, :2] @ m
+    return (across > low) & (across < high)
+
+
+def seam_segments(seam: SeamLine, contact: int) -> tuple[ConstraintSegment, ConstraintSegment]:
+    """Constraint segments for the piece before the seam and the one after it; the wood lies on the left of each."""
+    tangent = np.array([-seam.m[1], seam.m[0]])
+    low, high = sorted((seam.start, seam.end), key=lambda p: p @ tangent)
+    before = ConstraintSegment(start=low, end=high, origin="contact", standard_error=0.2, contact=contact)
+    return before, replace(before, start=high, end=low)
+
+
+def seam_contact(before: Sheet, after: Sheet, seam: SeamLine) -> Contact:
+    """The contact of type 4, cut on cut, between two pieces of one board."""
+    t = before.thickness.value
+    corners = [(*seam.start, 0.0), (*seam.end, 0.0), (*seam.end, t), (*seam.start, t)]
+    places = before.to_world(np.array(corners))
+    normal = before.world_from_board[:3, :2] @ seam.m
+    return Contact(
+        type=4, a=before.name, b=after.name, face_a="edge", face_b="edge", point=_point(places[0]), normal=_point(normal),
+        interface=(tuple(_point(p) for p in places),), area=float(np.linalg.norm(seam.end - seam.start) * t), angle=0.0,
+        evidence=ContactEvidence(seam_score=seam.strength, views=seam.views, decided_by="seam"),
+    )
+
+
+def _point(v: np.ndarray) -> tuple[float, float, float]:
+    return tuple(float(c) for c in v)
