@@ -1,4 +1,4 @@
-"""Bundler files (Snavely, Bundler v0.3 user's manual): a camera looks along -z with y up, the principal point in mid-image."""
+"""Bundler files (Snavely, Bundler v0.3 user's manual): cameras look along -z, y up, principal point in mid-image."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ __all__ = ["find_bundler", "read_bundler"]
 CAMERA_FROM_BUNDLER = np.diag([1.0, -1.0, -1.0])
 LINES_A_CAMERA = 5
 TURN_TOLERANCE = 1e-3  # of a rotation matrix printed with few digits from an orthonormal one
-LIST_LINE = re.compile(r"(?P<name>.*?\S)(?:\s+\d+\s+[0-9.eE+-]+)?\s*")  # Bundler adds a zero and the focal length of the EXIF
+LIST_LINE = re.compile(
+    r"(?P<name>.*?\S)(?:\s+\d+\s+[0-9.eE+-]+)?\s*"
+)  # Bundler adds a zero and the focal length of the EXIF
 
 
 def find_bundler(folder: Path) -> Path | None:
@@ -26,7 +28,7 @@ def find_bundler(folder: Path) -> Path | None:
 
 
 def read_bundler(path: Path, locate: Callable[[str], Path]) -> list[PosedImage]:
-    """Images with cameras and poses in the order of the list; cameras with focal length 0 were not registered and are left out.
+    """Images with cameras and poses in the order of the list; focal length 0 means not registered: left out.
 
     Parameters
     ----------
@@ -38,13 +40,23 @@ def read_bundler(path: Path, locate: Callable[[str], Path]) -> list[PosedImage]:
     CaptureError
         If one of the two files is missing or damaged, or their numbers of images differ.
     """
-    lines = [line.split() for line in read_text(path).splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    lines = [
+        line.split() for line in read_text(path).splitlines() if line.strip() and not line.lstrip().startswith("#")
+    ]
     count = whole_number(lines[0][0] if lines else "", path, "number of cameras", least=1)
     names = _names(path.with_name("list.txt"), count)
     if len(lines) - 1 < LINES_A_CAMERA * count:
-        raise capture_error(path, "lines", len(lines), f"{count} cameras need {LINES_A_CAMERA} each: the file is cut short, export it again")
+        raise capture_error(
+            path,
+            "lines",
+            len(lines),
+            f"{count} cameras need {LINES_A_CAMERA} each: the file is cut short, export it again",
+        )
     cameras = (lines[i : i + LINES_A_CAMERA] for i in range(1, 1 + LINES_A_CAMERA * count, LINES_A_CAMERA))
-    images = [_image(name, rows, path, f"camera {i}", locate) for i, (name, rows) in enumerate(zip(names, cameras, strict=True))]
+    images = [
+        _image(name, rows, path, f"camera {i}", locate)
+        for i, (name, rows) in enumerate(zip(names, cameras, strict=True))
+    ]
     registered = [image for image in images if image]
     if not registered:
         raise capture_error(path, "cameras", 0, "no image has a pose: export a model with registered images")
@@ -60,9 +72,13 @@ def _names(path: Path, count: int) -> list[str]:
     return [LIST_LINE.fullmatch(line.strip()).group("name") for line in lines]
 
 
-def _image(name: str, rows: list[list[str]], path: Path, field: str, locate: Callable[[str], Path]) -> PosedImage | None:
+def _image(
+    name: str, rows: list[list[str]], path: Path, field: str, locate: Callable[[str], Path]
+) -> PosedImage | None:
     if [len(row) for row in rows] != [3] * LINES_A_CAMERA:
-        raise capture_error(path, field, " ".join(rows[0]), "expected five lines of three numbers: export the file again")
+        raise capture_error(
+            path, field, " ".join(rows[0]), "expected five lines of three numbers: export the file again"
+        )
     numbers = np.array([[finite_float(word, path, field) for word in row] for row in rows])
     focal, k1, k2 = map(float, numbers[0])
     if focal == 0:

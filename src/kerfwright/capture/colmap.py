@@ -1,4 +1,4 @@
-"""COLMAP models, text and binary: cameras and poses (https://colmap.github.io/format.html). The sparse points are not read."""
+"""COLMAP models, text and binary: cameras and poses, not the sparse points (https://colmap.github.io/format.html)."""
 
 from __future__ import annotations
 
@@ -17,8 +17,17 @@ __all__ = ["find_colmap", "read_colmap"]
 
 # COLMAP's numbers of its camera models, those that kerfwright does not know included, so that an error can name them.
 MODEL_NAMES = (
-    "SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "OPENCV_FISHEYE", "FULL_OPENCV", "FOV",
-    "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "THIN_PRISM_FISHEYE",
+    "SIMPLE_PINHOLE",
+    "PINHOLE",
+    "SIMPLE_RADIAL",
+    "RADIAL",
+    "OPENCV",
+    "OPENCV_FISHEYE",
+    "FULL_OPENCV",
+    "FOV",
+    "SIMPLE_RADIAL_FISHEYE",
+    "RADIAL_FISHEYE",
+    "THIN_PRISM_FISHEYE",
 )
 POINT_BYTES = 24  # of a 2-D point in images.bin: x, y, 3-D point id
 
@@ -32,7 +41,7 @@ def find_colmap(folder: Path) -> Path | None:
 
 
 def read_colmap(folder: Path) -> list[PosedImage]:
-    """Images with cameras and poses, in the order of the file; binary is preferred where both are there, as COLMAP does.
+    """Images with cameras and poses, in the order of the file; binary files come before text, as in COLMAP.
 
     Raises
     ------
@@ -40,13 +49,19 @@ def read_colmap(folder: Path) -> list[PosedImage]:
         If a file is missing, damaged or uses a camera model that kerfwright does not know.
     """
     binary = (folder / "cameras.bin").is_file() and (folder / "images.bin").is_file()
-    end, cameras_of, images_of = (".bin", _binary_cameras, _binary_images) if binary else (".txt", _text_cameras, _text_images)
+    end, cameras_of, images_of = (
+        (".bin", _binary_cameras, _binary_images) if binary else (".txt", _text_cameras, _text_images)
+    )
     for path in (folder / f"cameras{end}", folder / f"images{end}"):
         if not path.is_file():
-            raise capture_error(path, "file", "missing", "a COLMAP model has cameras and images, both .txt or both .bin")
+            raise capture_error(
+                path, "file", "missing", "a COLMAP model has cameras and images, both .txt or both .bin"
+            )
     images = list(images_of(folder / f"images{end}", cameras_of(folder / f"cameras{end}")))
     if not images:
-        raise capture_error(folder / f"images{end}", "images", 0, "no image has a pose: export a model with registered images")
+        raise capture_error(
+            folder / f"images{end}", "images", 0, "no image has a pose: export a model with registered images"
+        )
     return images
 
 
@@ -63,10 +78,16 @@ def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
 
 def _text_camera(words: list[str], path: Path, field: str) -> tuple[int, Camera]:
     if len(words) < 5:
-        raise capture_error(path, field, " ".join(words), "expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS: export the file again")
-    width, height = (whole_number(w, path, f"{field} {n}") for w, n in zip(words[2:4], ("width", "height"), strict=True))
+        raise capture_error(
+            path, field, " ".join(words), "expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS: export the file again"
+        )
+    width, height = (
+        whole_number(w, path, f"{field} {n}") for w, n in zip(words[2:4], ("width", "height"), strict=True)
+    )
     params = tuple(finite_float(w, path, f"{field} parameter {i}") for i, w in enumerate(words[4:], 1))
-    return whole_number(words[0], path, f"{field} camera id"), checked_camera(words[1], width, height, params, path, field)
+    return whole_number(words[0], path, f"{field} camera id"), checked_camera(
+        words[1], width, height, params, path, field
+    )
 
 
 def _text_images(path: Path, cameras: dict[int, Camera]) -> Iterator[PosedImage]:
@@ -91,7 +112,9 @@ def _is_points(words: list[str]) -> bool:
 def _text_image(line: str, path: Path, field: str, cameras: dict[int, Camera]) -> PosedImage:
     words = line.strip().split(maxsplit=9)  # the name may hold spaces
     if len(words) < 10:
-        raise capture_error(path, field, line.strip(), "expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME: export the file again")
+        raise capture_error(
+            path, field, line.strip(), "expected IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME: export the file again"
+        )
     names = ("QW", "QX", "QY", "QZ", "TX", "TY", "TZ")
     numbers = np.array([finite_float(w, path, f"{field} {n}") for w, n in zip(words[1:8], names, strict=True)])
     camera = _camera_of(whole_number(words[8], path, f"{field} camera id"), cameras, path, field)
@@ -100,7 +123,9 @@ def _text_image(line: str, path: Path, field: str, cameras: dict[int, Camera]) -
 
 def _camera_of(camera_id: int, cameras: dict[int, Camera], path: Path, field: str) -> Camera:
     if camera_id not in cameras:
-        raise capture_error(path, f"{field} camera id", camera_id, "no such camera in the cameras file: export both files together")
+        raise capture_error(
+            path, f"{field} camera id", camera_id, "no such camera in the cameras file: export both files together"
+        )
     return cameras[camera_id]
 
 
@@ -117,7 +142,12 @@ class _Bytes:
 
     def too_short(self, count: int) -> CaptureError:
         left = len(self.data) - self.at
-        return capture_error(self.path, f"byte {self.at}", f"{left} bytes left of {count}", "the file is cut short: copy or export it again")
+        return capture_error(
+            self.path,
+            f"byte {self.at}",
+            f"{left} bytes left of {count}",
+            "the file is cut short: copy or export it again",
+        )
 
     def take(self, layout: str) -> tuple:
         start = self.at
@@ -132,7 +162,9 @@ class _Bytes:
         try:
             text = name.decode("utf-8")
         except UnicodeDecodeError:
-            raise capture_error(self.path, f"byte {self.at} name", name, "image names must be UTF-8: rename the image") from None
+            raise capture_error(
+                self.path, f"byte {self.at} name", name, "image names must be UTF-8: rename the image"
+            ) from None
         self.at = end + 1
         return text
 

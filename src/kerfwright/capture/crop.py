@@ -15,6 +15,7 @@ from kerfwright.capture.types import Cloud, View
 __all__ = ["Cropped", "above_floor", "crop_to_object", "focus"]
 
 LINK = 0.02  # of the cloud's size: points nearer than one to two of these belong together
+FARTHEST = 100.0  # of the cloud's size: strays beyond are taken to be there, so that a grid can hold them
 STRAY_SHARE = 0.002  # of the points: a group with fewer of them that touches nothing is not a board
 PEER_SHARE = 0.2  # of the largest group: one with as many of the points may be the object
 TOUCH = 0.1  # of the object's size: how far from its box a part of it may hang in the air, for want of points between
@@ -31,8 +32,8 @@ class Cropped:
 def above_floor(cloud: Cloud, floor: Floor) -> np.ndarray:
     """Mask, (N,), of points that are not of the floor.
 
-    The noise decides: four standard deviations above it, and twice that where the point looks up like the floor, whose points
-    rise beside what stands on it.
+    The noise decides: four standard deviations above it, and twice that where the point looks up like the floor, whose
+    points rise beside what stands on it.
     """
     heights = floor.heights(cloud.points)
     upward = np.abs(cloud.normals @ floor.normal) > np.cos(np.radians(45))
@@ -45,7 +46,9 @@ def focus(views: Sequence[View]) -> np.ndarray | None:
         return None
     axes = np.array([view.camera_from_world[2, :3] for view in views])
     centres = np.array([view.centre for view in views])
-    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]  # a point's distance from an axis is |across @ (point - centre)|
+    across = (
+        np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    )  # a point's distance from an axis is |across @ (point - centre)|
     middle = centres.mean(axis=0)
     matrix, right = across.sum(axis=0), np.einsum("nij,nj->i", across, centres - middle)
     if np.linalg.cond(matrix) > 1e4:
@@ -64,22 +67,19 @@ def crop_to_object(points: np.ndarray, looked_at: np.ndarray | None) -> Cropped:
     if not len(points):
         return Cropped(np.zeros(0, bool))
     low, high = np.percentile(points, (0.5, 99.5), axis=0)
-    group, count = _groups(points, LINK * float((high - low).max()))
+    size = max(float((high - low).max()), np.finfo(float).tiny)
+    near = np.clip(points, low - FARTHEST * size, high + FARTHEST * size)  # a stray at any distance is a stray
+    group, count = _groups((near - near.min(axis=0)) / (LINK * size))
     boxes = _boxes(points, group, len(count))
     main = _main_group(count, boxes, looked_at)
     members = _members(main, count, boxes)
-    keep = members[group]
-    return Cropped(keep, _notes(count, members, main))
+    return Cropped(members[group], _notes(count, members, main))
 
 
-def _groups(points: np.ndarray, link: float) -> tuple[np.ndarray, np.ndarray]:
-    """Connected groups on a grid of width `link`: each point's group, (N,), and the points in each group."""
-    cell = np.floor((points - points.min(axis=0)) / max(link, np.finfo(float).tiny)).astype(np.int64)
-    _, side_y, side_z = sides = cell.max(axis=0) + 3
-    if float(np.prod(sides.astype(float))) > 2**62:  # a stray at an astronomic distance: clamp it, it stays a stray
-        cell = np.clip(cell, *(np.percentile(cell, (1, 99), axis=0).astype(np.int64) + [[-1000], [1000]]))
-        cell -= cell.min(axis=0)
-        _, side_y, side_z = cell.max(axis=0) + 3
+def _groups(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Groups connected on the grid of whole numbers: each point's group, (N,), and the points in each group."""
+    cell = np.floor(points).astype(np.int64)
+    _, side_y, side_z = cell.max(axis=0) + 3
     key = (cell[:, 0] * side_y + cell[:, 1]) * side_z + cell[:, 2]
     cells, of_point = np.unique(key, return_inverse=True)
     steps = [(i * side_y + j) * side_z + k for i in (0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1)]
@@ -90,8 +90,11 @@ def _groups(points: np.ndarray, link: float) -> tuple[np.ndarray, np.ndarray]:
 def _connected(cells: np.ndarray, steps: list[int]) -> np.ndarray:
     """Group of each cell, (C,); cells are sorted keys, neighbours lie the given steps ahead."""
     ahead = [np.searchsorted(cells, cells + step) for step in steps]
-    pairs = [(np.flatnonzero(hit), at[hit]) for at, step in zip(ahead, steps, strict=True)
-             for hit in [cells[np.minimum(at, len(cells) - 1)] == cells + step]]
+    pairs = [
+        (np.flatnonzero(hit), at[hit])
+        for at, step in zip(ahead, steps, strict=True)
+        for hit in [cells[np.minimum(at, len(cells) - 1)] == cells + step]
+    ]
     row, column = (np.concatenate(ends) for ends in zip(*pairs, strict=True))
     graph = coo_matrix((np.ones(len(row), bool), (row, column)), shape=(len(cells), len(cells)))
     return connected_components(graph, directed=False)[1]
@@ -116,13 +119,13 @@ def _main_group(count: np.ndarray, boxes: np.ndarray, looked_at: np.ndarray | No
     large = np.flatnonzero(count >= PEER_SHARE * count.max())
     if looked_at is None:
         return int(count.argmax())
-    middle = boxes[large].mean(axis=1)
-    away = np.linalg.norm(middle - looked_at, axis=1) / np.maximum(np.linalg.norm(np.ptp(boxes[large], axis=1), axis=1), 1e-300)
+    size = np.linalg.norm(np.ptp(boxes[large], axis=1), axis=1)
+    away = np.linalg.norm(boxes[large].mean(axis=1) - looked_at, axis=1) / np.maximum(size, np.finfo(float).tiny)
     return int(large[np.lexsort((-count[large], away.round(3)))[0]])
 
 
 def _members(main: int, count: np.ndarray, boxes: np.ndarray) -> np.ndarray:
-    """Mask, (G,), of the groups that belong to the main one: boards that float near it only because their joints were not seen."""
+    """Mask, (G,), of the groups that belong to the main one: boards that float near it, their joints unseen."""
     members = np.arange(len(count)) == main
     enough = count >= STRAY_SHARE * count[main]
     reach = TOUCH * float(np.ptp(boxes[main], axis=0).max())
@@ -137,5 +140,8 @@ def _members(main: int, count: np.ndarray, boxes: np.ndarray) -> np.ndarray:
 def _notes(count: np.ndarray, members: np.ndarray, main: int) -> tuple[str, ...]:
     left_out = np.flatnonzero(~members & (count >= PEER_SHARE * count[main]))
     strays = int(count[~members].sum() - count[left_out].sum())
-    notes = [f"another object with {count[g]} points was left out: the cameras look at the one with {count[main]}" for g in left_out]
+    notes = [
+        f"another object with {count[g]} points was left out: the cameras look at the one with {count[main]}"
+        for g in left_out
+    ]
     return (*notes, f"{strays} stray points away from the object were left out") if strays else tuple(notes)

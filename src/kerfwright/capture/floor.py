@@ -12,7 +12,9 @@ __all__ = ["Floor", "find_floor"]
 
 ROUGH_POINTS = 60_000  # enough to find the floor; all points then fit it
 COLUMNS = 48  # a side of the grid in which the lowest points are looked for
-MIN_UPWARD = 0.5  # cosine of the largest angle between a floor point's normal and up: the tilt that is put right, and noise
+MIN_UPWARD = (
+    0.5  # cosine of the largest angle between a floor point's normal and up: the tilt that is put right, and noise
+)
 TRIALS = 500  # planes through three lowest points; with a fifth of them on the floor one in 125 hits
 ROUGH = 0.004  # of the cloud's size: what counts as on a trial plane before the noise is known
 MOST_BELOW = 0.02  # share of the points that may lie under the floor: reflections and strays
@@ -24,7 +26,7 @@ BEYOND = 1.08  # how far, as a factor of the object's own reach; a plinth ends w
 
 @dataclass(frozen=True, eq=False)
 class Floor:
-    """The plane normal @ x = offset, its unit normal pointing up; noise is the standard deviation of its points across it."""
+    """The plane normal @ x = offset, unit normal up; noise is the standard deviation of its points across it."""
 
     normal: np.ndarray
     offset: float
@@ -70,7 +72,9 @@ def _lowest_in_columns(cloud: Cloud) -> np.ndarray:
     return upward[order[tenth]]
 
 
-def _best_trial(points: np.ndarray, tolerance: float, generator: np.random.Generator) -> tuple[np.ndarray, float] | None:
+def _best_trial(
+    points: np.ndarray, tolerance: float, generator: np.random.Generator
+) -> tuple[np.ndarray, float] | None:
     """Normal and offset of the plane through three of the points that has the most of them on it and few below."""
     triples = points[generator.integers(0, len(points), (TRIALS, 3))]
     normals = np.cross(triples[:, 1] - triples[:, 0], triples[:, 2] - triples[:, 0])
@@ -127,7 +131,9 @@ def _goes_around(on: np.ndarray, above: np.ndarray, normal: np.ndarray) -> bool:
         inside = object_reach[object_sector == k]
         reach[k] = np.percentile(inside, 99) if len(inside) else 0.0
     outside = floor_reach > BEYOND * reach[floor_sector]
-    around = np.bincount(floor_sector[outside], minlength=SECTORS) > 0.2 * FEWEST_AROUND * (len(on) + len(above)) / SECTORS
+    around = (
+        np.bincount(floor_sector[outside], minlength=SECTORS) > 0.2 * FEWEST_AROUND * (len(on) + len(above)) / SECTORS
+    )
     return bool(outside.sum() > FEWEST_AROUND * (len(on) + len(above)) and around.mean() >= SECTORS_AROUND)
 
 

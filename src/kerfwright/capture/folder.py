@@ -10,12 +10,12 @@ from kerfwright.capture.bundler import find_bundler, read_bundler
 from kerfwright.capture.colmap import find_colmap, read_colmap
 from kerfwright.capture.frame import moved, up_rotation
 from kerfwright.capture.images import ImageFinder, image_size
-from kerfwright.capture.normals import orient_normals
+from kerfwright.capture.normals import normals_or_estimates
 from kerfwright.capture.parsing import capture_error
-from kerfwright.capture.ply import PlyPoints, read_ply
+from kerfwright.capture.ply import read_ply
 from kerfwright.capture.posed import PosedImage
 from kerfwright.capture.types import Capture, Cloud, View
-from kerfwright.errors import CaptureError, OptionError
+from kerfwright.errors import OptionError
 from kerfwright.model import Scale
 
 __all__ = ["ASSUMED_MILLIMETRES_PER_UNIT", "open_capture"]
@@ -71,21 +71,30 @@ def _views(folder: Path) -> tuple[View, ...]:
         base, source = bundle.parent, bundle
         images = read_bundler(bundle, lambda name: finder.find(name, bundle, base))
     else:
-        raise capture_error(folder, "cameras", "none", "put a COLMAP model into sparse/0 or a Bundler file into bundle/bundle.out")
+        raise capture_error(
+            folder, "cameras", "none", "put a COLMAP model into sparse/0 or a Bundler file into bundle/bundle.out"
+        )
     return tuple(_view(image, finder.find(image.name, source, base)) for image in images)
 
 
 def _view(image: PosedImage, path: Path) -> View:
     size = image_size(path)
     if size != (image.camera.width, image.camera.height):
-        raise capture_error(path, "image size", "{}x{}".format(*size), f"its camera says {image.camera.width}x"
-                            f"{image.camera.height}: use the images that the cameras were computed for")
+        raise capture_error(
+            path,
+            "image size",
+            "{}x{}".format(*size),
+            f"its camera says {image.camera.width}x{image.camera.height}: use the images the cameras were computed for",
+        )
     return View(image.name, path, image.camera, image.camera_from_capture)
 
 
 def _find_cloud(folder: Path) -> Path:
     """cloud.ply, else fused.ply, else the largest *.ply."""
-    files = sorted((p for p in folder.iterdir() if p.suffix.lower() == ".ply" and p.is_file()), key=lambda p: (-p.stat().st_size, p.name))
+    files = sorted(
+        (p for p in folder.iterdir() if p.suffix.lower() == ".ply" and p.is_file()),
+        key=lambda p: (-p.stat().st_size, p.name),
+    )
     if not files:
         raise capture_error(folder, "cloud", "none", "put the stereo cloud there as cloud.ply")
     return min(files, key=lambda p: CLOUD_NAMES.index(p.name) if p.name in CLOUD_NAMES else len(CLOUD_NAMES))
@@ -94,7 +103,7 @@ def _find_cloud(folder: Path) -> Path:
 def _cloud(path: Path, views: tuple[View, ...]) -> tuple[Cloud, tuple[str, ...]]:
     read = read_ply(path)
     _check_points(read.points, path)
-    normals, notes = _normals(read, views, path)
+    normals, notes = normals_or_estimates(read.points, read.normals, views)
     return Cloud(read.points, normals, read.colours), notes
 
 
@@ -103,14 +112,11 @@ def _check_points(points: np.ndarray, path: Path) -> None:
         raise capture_error(path, "points", len(points), f"at least {FEWEST_POINTS} are needed: export the dense cloud")
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if len(bad):
-        raise capture_error(path, f"vertex {bad[0]}", points[bad[0]], f"not a place ({len(bad)} such): remove these points, or export again")
+        raise capture_error(
+            path,
+            f"vertex {bad[0]}",
+            points[bad[0]],
+            f"not a place ({len(bad)} such): remove these points, or export again",
+        )
     if not np.ptp(points, axis=0).max() > 0:
         raise capture_error(path, "points", points[0], "all are at one place: export the dense cloud")
-
-
-def _normals(read: PlyPoints, views: tuple[View, ...], path: Path) -> tuple[np.ndarray, tuple[str, ...]]:
-    if read.normals is None:
-        note = f"{path.name} has no normals: they were estimated and turned towards the cameras"
-        return orient_normals(read.points, views), (note,)
-    length = np.linalg.norm(read.normals, axis=1)
-    return read.normals / length[:, None], ()

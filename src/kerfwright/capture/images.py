@@ -24,7 +24,9 @@ class ImageFinder:
         self.capture = capture
         self.folders = tuple(f for f in (capture / "images", capture) if f.is_dir())
         if not any(p.suffix.lower() in SUFFIXES for f in self.folders for p in f.rglob("*")):
-            raise capture_error(capture, "images", "none", "put the JPEG, PNG or TIFF photographs into its folder images/")
+            raise capture_error(
+                capture, "images", "none", "put the JPEG, PNG or TIFF photographs into its folder images/"
+            )
 
     def find(self, name: str, source: Path, base: Path | None = None) -> Path:
         """The file of a name that `source` gives; names are relative to images/, the capture, or `base`.
@@ -39,13 +41,17 @@ class ImageFinder:
             for folder in folders:
                 if (path := self._inside(folder, text, name, source)).is_file():
                     return path
-        raise capture_error(source, "image", name, f"no such file in {self.folders[0]}: put it there, or export cameras without it")
+        raise capture_error(
+            source, "image", name, f"no such file in {self.folders[0]}: put it there, or export cameras without it"
+        )
 
     def _inside(self, folder: Path, text: str, name: str, source: Path) -> Path:
         """Judged by the name alone: a user's link to a folder elsewhere is the user's will, a file's `../` is not."""
         path = Path(os.path.abspath(folder / text)) if "\0" not in text else None
         if path is None or re.match(r"[A-Za-z]:[\\/]", text) or not path.is_relative_to(os.path.abspath(self.capture)):
-            raise capture_error(source, "image", name, f"outside of {self.capture}: use names relative to its folder images/")
+            raise capture_error(
+                source, "image", name, f"outside of {self.capture}: use names relative to its folder images/"
+            )
         return path
 
 
@@ -61,7 +67,9 @@ def image_size(path: Path) -> tuple[int, int]:
         with path.open("rb") as file:
             return _size(file)
     except (struct.error, OverflowError, ValueError, IndexError, OSError):
-        raise capture_error(path, "image", "no size in its header", "check that the file is a whole JPEG, PNG or TIFF") from None
+        raise capture_error(
+            path, "image", "no size in its header", "check that the file is a whole JPEG, PNG or TIFF"
+        ) from None
 
 
 def _size(file: BinaryIO) -> tuple[int, int]:

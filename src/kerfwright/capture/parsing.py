@@ -50,7 +50,9 @@ def whole_number(text: str, path: Path, field: str, least: int = 0) -> int:
         If the text is anything else.
     """
     if not (text.isascii() and text.isdigit() and len(text) < 20) or int(text) < least:
-        raise capture_error(path, field, text, f"a whole number of at least {least} belongs here: export the file again")
+        raise capture_error(
+            path, field, text, f"a whole number of at least {least} belongs here: export the file again"
+        )
     return int(text)
 
 
@@ -80,4 +82,6 @@ def read_text(path: Path) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise capture_error(path, f"byte {error.start}", data[error.start : error.start + 4], "save the file as UTF-8") from None
+        raise capture_error(
+            path, f"byte {error.start}", data[error.start : error.start + 4], "save the file as UTF-8"
+        ) from None

@@ -1,7 +1,8 @@
-"""The floor where it was cut out of the cloud: the height at which the photographs agree about what lies around the object.
+"""The floor where it was cut out of the cloud: the height at which the photographs agree on what lies round the object.
 
-A plane sweep (Collins, A space-sweep approach to true multi-image matching, 1996): every photograph is laid on a level plane; at the
-floor's height the pictures of its texture fall on each other, and their normalised cross-correlation has a sharp peak.
+A plane sweep (Collins, A space-sweep approach to true multi-image matching, 1996): every photograph is laid on a level
+plane; at the floor's height the pictures of its texture fall on each other, and their normalised cross-correlation has
+a sharp peak.
 """
 
 from __future__ import annotations
@@ -17,11 +18,13 @@ from kerfwright.capture.types import Cloud, View
 __all__ = ["PhotoFloor", "floor_in_photos"]
 
 VIEWS = 10  # each more costs as much and tells less
-LOWEST_SIGHT = 0.2  # sine of the least angle between a line of sight and the floor: below it texture is too foreshortened
+LOWEST_SIGHT = (
+    0.2  # sine of the least angle between a line of sight and the floor: below it texture is too foreshortened
+)
 AROUND = 0.3  # of the object's size: how far the floor is looked at beside it
 DEEPEST = 0.10  # of the object's size: how far under its lowest points the floor may lie
-# Cells along the longer side, step in heights as a share of the object's size, and number of heights: each round looks closer about
-# the peak of the one before.
+# Cells along the longer side, step in heights as a share of the object's size, and number of heights: each round looks
+# closer about the peak of the one before.
 ROUNDS = ((160, 0.004, 28), (400, 0.0015, 7), (720, 0.0008, 5))
 WINDOW = 9  # cells a side of the patches that are compared
 LEAST_PEAK = 0.2  # correlation at the floor; between unlike pictures it is about zero
@@ -56,7 +59,7 @@ class _Grid:
 
 @dataclass(frozen=True, eq=False)
 class _Picture:
-    """A grey picture without distortion: (u, v, w) = index_from_world @ (x, y, z, 1), in cv2's indices; shadow: where the object hides the floor."""
+    """A grey picture without distortion: index_from_world is 3x4, to cv2's indices; seen masks the floor it shows."""
 
     grey: np.ndarray
     index_from_world: np.ndarray
@@ -74,7 +77,7 @@ def floor_in_photos(views: Sequence[View], cloud: Cloud, lowest: float) -> Photo
 
     Returns
     -------
-    None where the photographs do not show a textured floor: fewer than three look down on it, or they agree at no height.
+    None where the photographs show no textured floor: fewer than three look down on it, or they agree at no height.
     """
     views = _looking_down([view for view in views if view.path.is_file()], lowest, cloud)
     if len(views) < 3:
@@ -85,7 +88,9 @@ def floor_in_photos(views: Sequence[View], cloud: Cloud, lowest: float) -> Photo
     return None if found is None else PhotoFloor(*found, len(views))
 
 
-def _search(views: Sequence[View], greys: Sequence[np.ndarray], cloud: Cloud, deepest: float) -> tuple[float, float] | None:
+def _search(
+    views: Sequence[View], greys: Sequence[np.ndarray], cloud: Cloud, deepest: float
+) -> tuple[float, float] | None:
     """Height and correlation of the floor, looked for from `deepest` upwards; None without a clear peak."""
     (cells, step, count), *closer = ROUNDS
     heights = deepest + np.arange(count) * step * cloud.diameter
@@ -102,9 +107,15 @@ def _looking_down(views: Sequence[View], lowest: float, cloud: Cloud) -> list[Vi
     """Up to VIEWS views from well above the floor, evenly round the object."""
     foot = np.array([*np.median(cloud.points[:, :2], axis=0), lowest])
     ways = [(view.centre - foot) / np.linalg.norm(view.centre - foot) for view in views]
-    steep = [(float(np.arctan2(way[1], way[0])), view) for way, view in zip(ways, views, strict=True) if way[2] > LOWEST_SIGHT]
+    steep = [
+        (float(np.arctan2(way[1], way[0])), view)
+        for way, view in zip(ways, views, strict=True)
+        if way[2] > LOWEST_SIGHT
+    ]
     around = [view for _, view in sorted(steep, key=lambda pair: pair[0])]
-    return [around[i] for i in np.unique(np.linspace(0, len(around), min(VIEWS, len(around)), endpoint=False).astype(int))]
+    return [
+        around[i] for i in np.unique(np.linspace(0, len(around), min(VIEWS, len(around)), endpoint=False).astype(int))
+    ]
 
 
 def _grey(view: View) -> np.ndarray:
@@ -118,10 +129,14 @@ def _grey(view: View) -> np.ndarray:
     return grey
 
 
-def _sweep(views: Sequence[View], greys: Sequence[np.ndarray], cloud: Cloud, heights: np.ndarray, cells: int) -> np.ndarray:
+def _sweep(
+    views: Sequence[View], greys: Sequence[np.ndarray], cloud: Cloud, heights: np.ndarray, cells: int
+) -> np.ndarray:
     """Correlation of the pictures at each height, (H,)."""
     grid = _grid(cloud, cells)
-    pictures = [_picture(view, grey, cloud, grid, float(heights.mean())) for view, grey in zip(views, greys, strict=True)]
+    pictures = [
+        _picture(view, grey, cloud, grid, float(heights.mean())) for view, grey in zip(views, greys, strict=True)
+    ]
     return np.array([_correlation(pictures, grid, height) for height in heights])
 
 
@@ -187,24 +202,27 @@ def _laid_on(picture: _Picture, grid: _Grid, height: float) -> tuple[np.ndarray,
 
     m = picture.index_from_world
     homography = np.stack([m[:, 0], m[:, 1], m[:, 2] * height + m[:, 3]], axis=1) @ grid.world_from_index
-    laid = cv2.warpPerspective(picture.grey, homography, grid.shape[::-1], flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-                               borderValue=-1e4)
+    laid = cv2.warpPerspective(
+        picture.grey, homography, grid.shape[::-1], flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderValue=-1e4
+    )
     return laid, picture.seen & (laid >= 0)
 
 
 def _normalised(values: np.ndarray, shown: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Values less their mean over their standard deviation in the window about each; zero where the window is not whole."""
+    """Values less the mean, over the deviation, of the window about each; zero where that is not whole."""
     import cv2
 
     window = (WINDOW, WINDOW)
     whole = cv2.boxFilter(shown.astype(np.float32), -1, window) > 1 - 0.5 / WINDOW**2
     mean = cv2.boxFilter(values, -1, window)
-    deviation = np.sqrt(np.maximum(cv2.boxFilter(values * values, -1, window) - mean * mean, 1.0))  # at least one grey level: noise
+    deviation = np.sqrt(
+        np.maximum(cv2.boxFilter(values * values, -1, window) - mean * mean, 1.0)
+    )  # at least one grey level: noise
     return np.where(whole, (values - mean) / deviation, 0).astype(np.float32), whole
 
 
 def _peak(heights: np.ndarray, scores: np.ndarray) -> tuple[float, float] | None:
-    """Place and height of the highest peak, by a parabola through its upper half; None where it is low or at the end."""
+    """Place and height of the highest peak, by a parabola through its top; None where it is low or at the end."""
     i = int(scores.argmax())
     if not 0 < i < len(scores) - 1 or scores[i] < LEAST_PEAK:
         return None

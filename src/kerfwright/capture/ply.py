@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -112,8 +112,12 @@ def _binary_columns(file: BinaryIO, header: PlyHeader, index: int, wanted: list[
 
 
 def _cut_short(header: PlyHeader, element: Element, found: int) -> Exception:
-    return capture_error(header.path, f"element {element.name}", f"{found} rows of {element.count}",
-                         "the file is cut short: copy or export it again")
+    return capture_error(
+        header.path,
+        f"element {element.name}",
+        f"{found} rows of {element.count}",
+        "the file is cut short: copy or export it again",
+    )
 
 
 def _list_rows(file: BinaryIO, element: Element, header: PlyHeader) -> Iterator[list[float | None]]:
@@ -135,23 +139,32 @@ def _value(file: BinaryIO, kind: np.dtype, length: np.dtype | None) -> float | N
 
 def _code(kind: np.dtype) -> str:
     """struct's code of a number type."""
-    return (kind.byteorder if kind.byteorder in "<>" else "<" if np.little_endian else ">") + kind.char.replace("l", "i").replace("L", "I")
+    return kind.str[0].replace("|", "<") + kind.char
 
 
 def _ascii_columns(file: BinaryIO, header: PlyHeader, index: int, wanted: list[int]) -> list[np.ndarray]:
-    """The element's columns as float64; colours of whole numbers keep their type."""
+    """Columns of the element; colours of whole numbers keep their type."""
     text = io.TextIOWrapper(file, encoding="latin-1")
     for element in header.elements[:index]:
         _pass_over(text, element)
     element = header.elements[index]
-    source = _without_lists(text, element) if element.has_lists else text
-    try:
-        table = np.loadtxt(source, usecols=wanted, max_rows=element.count, comments=None, ndmin=2) if element.count else np.empty((0, len(wanted)))
-    except ValueError as error:
-        raise capture_error(header.path, "element vertex", str(error).split(";")[0], "numbers with decimal points belong here: export the cloud again") from None
+    table = _ascii_table(_without_lists(text, element) if element.has_lists else text, element, wanted, header.path)
     if len(table) < element.count:
         raise _cut_short(header, element, len(table))
-    return [table[:, k].astype(element.properties[i].kind if element.properties[i].kind.kind != "f" else float, copy=False) for k, i in enumerate(wanted)]
+    kinds = [element.properties[i].kind for i in wanted]
+    return [table[:, k].astype(float if kind.kind == "f" else kind, copy=False) for k, kind in enumerate(kinds)]
+
+
+def _ascii_table(lines: Iterable[str], element: Element, wanted: list[int], path: Path) -> np.ndarray:
+    if not element.count:
+        return np.empty((0, len(wanted)))
+    try:
+        return np.loadtxt(lines, usecols=wanted, max_rows=element.count, comments=None, ndmin=2)
+    except ValueError as error:
+        found = str(error).split(";")[0]
+        raise capture_error(
+            path, "element vertex", found, "numbers with decimal points belong here: export again"
+        ) from None
 
 
 def _pass_over(text: io.TextIOBase, element: Element) -> None:

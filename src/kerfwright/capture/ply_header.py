@@ -16,8 +16,22 @@ __all__ = ["ASCII", "Element", "PlyHeader", "Property", "read_header"]
 ASCII = "ascii"
 BYTE_ORDERS = {ASCII: "", "binary_little_endian": "<", "binary_big_endian": ">"}
 NUMBER_TYPES = {
-    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2", "uint16": "u2",
-    "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
+    "char": "i1",
+    "int8": "i1",
+    "uchar": "u1",
+    "uint8": "u1",
+    "short": "i2",
+    "int16": "i2",
+    "ushort": "u2",
+    "uint16": "u2",
+    "int": "i4",
+    "int32": "i4",
+    "uint": "u4",
+    "uint32": "u4",
+    "float": "f4",
+    "float32": "f4",
+    "double": "f8",
+    "float64": "f8",
 }
 HEADER_BYTES = 1 << 20  # a header is a few hundred bytes; more is no header
 
@@ -83,7 +97,9 @@ def read_header(file: BinaryIO, path: Path) -> PlyHeader:
     size = end + len(b"end_header")
     size += 2 if start[size : size + 2] == b"\r\n" else 1
     if end < 0 or size > len(start):
-        raise capture_error(path, "header", "no end_header", "the file is cut short or damaged: copy or export it again")
+        raise capture_error(
+            path, "header", "no end_header", "the file is cut short or damaged: copy or export it again"
+        )
     lines = start[:end].decode("latin-1").replace("\r\n", "\n").replace("\r", "\n").split("\n")
     header = PlyHeader(path, _encoding(lines, path), _elements(lines, path), size)
     _check_room(header, os.fstat(file.fileno()).st_size - size)
@@ -114,7 +130,9 @@ def _elements(lines: list[str], path: Path) -> tuple[Element, ...]:
 def _property(words: list[str], order: str, path: Path, number: int) -> Property:
     kinds = words[2:4] if words[1:2] == ["list"] else words[1:2]
     if len(words) != (5 if words[1:2] == ["list"] else 3) or any(k not in NUMBER_TYPES for k in kinds):
-        raise capture_error(path, f"header line {number}", " ".join(words), "not a PLY property: export the cloud again")
+        raise capture_error(
+            path, f"header line {number}", " ".join(words), "not a PLY property: export the cloud again"
+        )
     dtypes = [np.dtype(order + NUMBER_TYPES[k]) for k in kinds]
     return Property(words[-1], dtypes[-1], dtypes[0] if len(dtypes) == 2 else None)
 
@@ -123,5 +141,9 @@ def _check_room(header: PlyHeader, left: int) -> None:
     for element in header.elements:
         left -= element.least_bytes(header.encoding == ASCII)
         if element.count and left < -1:  # the last line may lack its end
-            raise capture_error(header.path, f"element {element.name}", element.count,
-                                "more than the file holds: it is cut short or its header is wrong, copy or export it again")
+            raise capture_error(
+                header.path,
+                f"element {element.name}",
+                element.count,
+                "more than the file holds: it is cut short or its header is wrong, copy or export it again",
+            )

@@ -36,12 +36,18 @@ def checked_camera(model: str, width: int, height: int, params: tuple[float, ...
     """
     if model not in CAMERA_MODELS:
         known = ", ".join(sorted(CAMERA_MODELS))
-        raise capture_error(path, f"{field} model", model, f"kerfwright knows {known}: undistort the images, then export again")
+        raise capture_error(
+            path, f"{field} model", model, f"kerfwright knows {known}: undistort the images, then export again"
+        )
     if len(params) != len(CAMERA_MODELS[model]):
-        raise capture_error(path, f"{field} parameters", len(params), f"{model} has {len(CAMERA_MODELS[model])}: export the file again")
+        raise capture_error(
+            path, f"{field} parameters", len(params), f"{model} has {len(CAMERA_MODELS[model])}: export the file again"
+        )
     for name, size in (("width", width), ("height", height)):
         if not 0 < size <= LARGEST_SIDE:
-            raise capture_error(path, f"{field} {name}", size, f"between 1 and {LARGEST_SIDE} pixels: export the file again")
+            raise capture_error(
+                path, f"{field} {name}", size, f"between 1 and {LARGEST_SIDE} pixels: export the file again"
+            )
     for name, value in zip(CAMERA_MODELS[model], params, strict=True):
         if not math.isfinite(value) or (name in ("f", "fx", "fy") and value <= 0):
             raise capture_error(path, f"{field} {name}", value, "impossible for a camera: export the file again")
@@ -57,7 +63,9 @@ def pose_matrix(quaternion: np.ndarray, translation: np.ndarray, path: Path, fie
         If a number is not finite or the quaternion is zero.
     """
     if not (np.isfinite(quaternion).all() and np.isfinite(translation).all()):
-        raise capture_error(path, field, [*quaternion, *translation], "finite numbers belong here: export the file again")
+        raise capture_error(
+            path, field, [*quaternion, *translation], "finite numbers belong here: export the file again"
+        )
     if np.linalg.norm(quaternion) < 1e-6:
         raise capture_error(path, f"{field} quaternion", quaternion, "its length must be 1: export the file again")
     pose = np.eye(4)

@@ -30,8 +30,10 @@ class PrepareOptions:
     Attributes
     ----------
     crop : leave out the floor, other objects and strays.
-    ground : height of the floor in capture units along the up axis, instead of looking for it; nothing is levelled then.
-    photos : look for the floor in the photographs where the cloud has none; otherwise the object's lowest points stand on it.
+    ground : height of the floor in capture units along the up axis, instead of looking for it; nothing is
+        levelled then.
+    photos : look for the floor in the photographs where the cloud has none; otherwise the
+        object's lowest points stand on it.
     seed : of the search for the floor.
     """
 
@@ -44,8 +46,8 @@ class PrepareOptions:
 def prepare(capture: Capture, options: PrepareOptions | None = None) -> Capture:
     """Level, crop, turn, centre and scale a capture; turned, moved or scaled input gives the same.
 
-    The horizontal direction that most upright faces look along becomes x or y, the longer side lies along x; z = 0 is the floor,
-    or the lowest of the object where the cloud has no floor.
+    The horizontal direction that most upright faces look along becomes x or y, the longer side lies along x. z = 0 is
+    the floor: of the cloud, else of the photographs, else where the object begins.
 
     Returns
     -------
@@ -92,8 +94,10 @@ def _cropped(capture: Capture, floor: Floor | None) -> Capture:
     cropped: Cropped = crop_to_object(cloud.points, focus(capture.views))
     cloud = cloud.select(cropped.keep)
     if len(cloud) < FEWEST_POINTS:
-        raise CaptureError(f"{capture.name}: points above the floor: {len(cloud)}: at least {FEWEST_POINTS} are needed: "
-                           "check --up and --ground")
+        raise CaptureError(
+            f"{capture.name}: points above the floor: {len(cloud)}: at least {FEWEST_POINTS} are needed: "
+            "check --up and --ground"
+        )
     return replace(capture, cloud=cloud, notes=(*notes, *cropped.notes))
 
 
@@ -105,15 +109,17 @@ def _ground(capture: Capture, options: PrepareOptions) -> tuple[float, tuple[str
     if found is None:
         return lowest, ("no floor was found: the lowest points of the object are taken to stand on it",)
     below = 100 * (lowest - found.height) / cloud.diameter
-    return found.height, (f"the floor is not in the cloud; {found.views} photographs show it {below:.2f} % of the object's size "
-                          "below its lowest points",)
+    return found.height, (
+        f"the floor is not in the cloud; {found.views} photographs show it {below:.2f} % of the object's size "
+        "below its lowest points",
+    )
 
 
 def robust_lowest(heights: np.ndarray) -> float:
     """Where an object stands: the height at which its points begin, strays apart.
 
-    Upright faces give points evenly over the height, blurred by noise at their end: the end is where the density first reaches half
-    of what it is a little higher.
+    Upright faces give points evenly over the height, blurred by noise at their end: the end is where the density first
+    reaches half of what it is a little higher.
     """
     low, high = np.percentile(heights, (0.05, 99.9))
     near = heights[(heights >= low - 0.01 * (high - low)) & (heights < low + 0.05 * (high - low))]

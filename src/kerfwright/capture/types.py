@@ -1,8 +1,8 @@
 """What a capture holds: cameras, views, an oriented cloud, and where the world lies in the capture's own frame.
 
-Frames: *capture* is the frame and unit of the files. *world* is what every later stage works in and becomes the *model* frame:
-right-handed, millimetres, +z up, floor at z = 0, the object about the origin. A capture as read has world = capture
-(`capture_from_world` is the identity); `kerfwright.capture.prepare` moves it. *camera* is x right, y down, z forward.
+Frames: *capture* is the frame and unit of the files. *world* is what every later stage works in and becomes the *model*
+frame: right-handed, millimetres, +z up, floor at z = 0, the object about the origin. A capture as read has world =
+capture, turned so that +z is up; `kerfwright.capture.prepare` moves it. *camera* is x right, y down, z forward.
 Pixels: the centre of the top left pixel is (0.5, 0.5), as in COLMAP.
 """
 

@@ -27,7 +27,10 @@ def write_colmap_text(folder: Path, views: Sequence[View]) -> None:
     cameras = [_camera_line(i, camera) for camera, i in camera_ids.items()]
     images = [f"{_image_line(i, view, camera_ids[view.camera])}\n" for i, view in enumerate(views, 1)]
     _write(folder / "cameras.txt", ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]", *cameras])
-    _write(folder / "images.txt", ["# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME", "# POINTS2D[] as (X, Y, POINT3D_ID)", *images])
+    _write(
+        folder / "images.txt",
+        ["# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME", "# POINTS2D[] as (X, Y, POINT3D_ID)", *images],
+    )
     _write(folder / "points3D.txt", ["# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)"])
 
 
