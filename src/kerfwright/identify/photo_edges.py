@@ -114,6 +114,13 @@ def _combine(slopes: np.ndarray, owners: list[int], offsets: np.ndarray) -> Swee
     return SweepResult(offsets, strength, best, error, float(strength[k] / np.median(strength)), len(set(owners)), shown)
 
 
+def _limited(strength: np.ndarray, most: float = 12.0) -> np.ndarray:
+    """Values pressed below `most`; still rising, for a flat top would hide where the peak is."""
+    knee = 0.75 * most
+    excess = np.maximum(strength / knee - 1, 0) * knee / (most - knee)
+    return np.minimum(strength, knee) + (most - knee) * excess / (1 + excess)
+
+
 def refine_peak(y: np.ndarray) -> float:
     """Vertex of the parabola through three samples, in steps from the middle one, within one step."""
     bend = y[0] - 2 * y[1] + y[2]
