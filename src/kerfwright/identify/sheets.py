@@ -74,10 +74,15 @@ def _stops_at(crossing: Slab, slab: Slab, reach: float) -> bool:
 
 
 def _thickened(slab: Slab, reach: float) -> Slab:
-    """The slab with its sheet planes moved out, so that a board that only touches it has a section in it."""
+    """The slab with its sheet planes moved out, so that a board that only touches it has a section in it.
+
+    A section is taken a quarter of the thickness inside: that must be outside the true slab by half the reach.
+    """
+    thickness = slab.thickness.value
+    margin = max(2 * reach, thickness / 2 + reach)
     board = slab.world_from_board.copy()
-    board[:3, 3] -= 2 * reach * slab.normal
-    return replace(slab, world_from_board=board, thickness=replace(slab.thickness, value=slab.thickness.value + 4 * reach))
+    board[:3, 3] -= margin * slab.normal
+    return replace(slab, world_from_board=board, thickness=replace(slab.thickness, value=thickness + 2 * margin))
 
 
 def _bridge(a: Polygon, b: Polygon, gap: float) -> Polygon:
