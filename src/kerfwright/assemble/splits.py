@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from shapely.geometry import Polygon
+from shapely.geometry import LineString, Polygon
 
 from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.assemble.visibility import Obstacles
@@ -82,7 +82,7 @@ def _seams_across(
     return [
         SeamLine(m, float(offsets[k]), offsets[k] * m + ends[0] * tangent, offsets[k] * m + ends[1] * tangent, float(strength[k]), sweep.views)
         for k in _peaks(strength, sweep.persistence, reach=round(margin / (offsets[1] - offsets[0])))
-        if all(abs(offsets[k] - other) > margin / 2 for other in known) and _crosses_all(sheet.region, m, offsets[k])
+        if all(abs(offsets[k] - other) > margin / 2 for other in known) and _crosses_all(sheet.region, m, offsets[k], margin / 4)
     ]
 
 
@@ -107,11 +107,15 @@ def _known_lines(sheet: Sheet, m: np.ndarray, touching: list[Sheet]) -> list[flo
     return lines
 
 
-def _crosses_all(region: Polygon, m: np.ndarray, offset: float) -> bool:
-    """Whether the line runs through wood all the way, not through a hole."""
-    return not any(
-        (np.asarray(hole.coords)[:, :2] @ m).min() < offset < (np.asarray(hole.coords)[:, :2] @ m).max() for hole in region.interiors
-    )
+def _crosses_all(region: Polygon, m: np.ndarray, offset: float, reach: float) -> bool:
+    """Whether the line, and lines a little before and after it, run through one stretch of wood: not past a hole or a bay."""
+    tangent = np.array([-m[1], m[0]])
+    for shift in (-reach, 0.0, reach):
+        middle = (offset + shift) * m
+        chord = region.intersection(LineString([middle - 1e5 * tangent, middle + 1e5 * tangent]))
+        if chord.geom_type != "LineString" or chord.is_empty:
+            return False
+    return True
 
 
 def split_sheet(sheet: Sheet, seams: list[SeamLine], points: np.ndarray) -> list[Sheet]:
