@@ -52,6 +52,8 @@ def see_through(capture: Capture, spacing: float, margin: float) -> FreeSpace:
 
 def _map_pixel(capture: Capture, spacing: float) -> float:
     """Photo pixels that span about 1.5 point spacings at the object, so that a closed surface draws closed."""
+    if not capture.views:
+        return 1.0
     centre = np.median(capture.cloud.points, axis=0)
     per_mm = [v.camera.focal / np.linalg.norm(v.centre - centre) for v in capture.views]
     return max(1.5 * spacing * float(np.median(per_mm)), 1.0)

@@ -1,0 +1,107 @@
+"""Contacts on a photographed shelf, and on boards without photographs."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from clouds import box_cloud, cloud_only, pose, shelf_capture, shelf_parts, sheet
+from shapely.geometry import Polygon
+
+from kerfwright.assemble import AssembleOptions, assemble
+from kerfwright.assemble.contacts import find_contacts, to_contact
+from kerfwright.identify.freespace import FreeSpace
+from kerfwright.identify.photo_edges import Photos
+
+SHELF = sheet("shelf", pose((0, 0, 200)), 18.0, (-150, 0, 150, 100))
+
+
+def upright(name: str, x: float, high: float):
+    return sheet(name, pose((x, 0, 0), (0, 1, 0), (0, 0, 1)), 18.0, (0, 0, 100, high))
+
+
+@pytest.fixture(scope="module")
+def shelf():
+    return assemble(shelf_parts(), shelf_capture())
+
+
+def role(sheet) -> str:
+    """Which board of the tiny assembly this is, by its normal and place."""
+    if abs(sheet.normal[2]) > 0.99:
+        return "top"
+    middle = sheet.to_world(np.array([[0, 0, sheet.thickness.value / 2]]))[0]
+    return "left" if middle[0] < 0 else "right"
+
+
+def test_every_board_and_every_contact_is_found_with_its_type(shelf):
+    roles = {s.name: role(s) for s in shelf.sheets}
+    assert sorted(roles.values()) == ["left", "right", "top"]
+    found = sorted((c.type, roles[c.a], roles[c.b], c.face_b) for c in shelf.contacts)
+    assert found == [(1, "top", "left", "edge"), (1, "top", "right", "edge")]
+
+
+def test_contacts_lie_on_the_underside_of_the_shelf(shelf):
+    for contact in shelf.contacts:
+        assert contact.point[2] == pytest.approx(200, abs=0.3)
+        assert contact.normal == pytest.approx((0, 0, -1), abs=5e-3)
+        assert contact.angle == pytest.approx(90, abs=1e-4)
+        assert contact.area == pytest.approx(2400, rel=0.06)
+        assert not contact.bevelled
+
+
+def test_interfaces_are_counter_clockwise_about_the_normal(shelf):
+    for contact in shelf.contacts:
+        (corners,) = (np.array(p) for p in contact.interface)
+        area = 0.5 * np.cross(corners - corners[0], np.roll(corners, -1, axis=0) - corners[0]).sum(axis=0)
+        assert abs(area @ contact.normal) == pytest.approx(contact.area, rel=1e-3)
+
+
+def test_thicknesses_of_the_uprights_are_shared_and_right(shelf):
+    value = {role(s): s.thickness.value for s in shelf.sheets}
+    assert value["left"] == value["right"] == pytest.approx(15, abs=0.4)
+    assert value["top"] == pytest.approx(18, abs=0.4)
+
+
+def test_constraints_end_the_uprights_at_shelf_and_floor(shelf):
+    for sheet_, segments in zip(shelf.sheets, shelf.constraints, strict=True):
+        assert [s.origin for s in segments] == ([] if role(sheet_) == "top" else ["contact", "ground"])
+
+
+def decided_without_photos(*sheets):
+    cloud = box_cloud(((-150, 0, 0), (150, 100, 218)), spacing=20.0)
+    capture = cloud_only(cloud)
+    return find_contacts(sheets, cloud, Photos(capture), FreeSpace((), (), 1.0, 1.0), AssembleOptions())
+
+
+def test_geometry_alone_decides_a_tee():
+    (found,) = decided_without_photos(SHELF, upright("upright", -9, 197))
+    contact = to_contact(found, (SHELF, upright("upright", -9, 197)))
+    assert (contact.type, contact.a, contact.b, contact.face_a) == (1, "shelf", "upright", "bottom")
+    assert contact.evidence.decided_by == "geometry"
+    assert contact.area == pytest.approx(1800, rel=0.05)
+    (corners,) = contact.interface
+    assert Polygon([p[:2] for p in corners]).area == pytest.approx(contact.area, rel=1e-6)
+
+
+def test_a_corner_that_no_photograph_shows_is_a_default():
+    (found,) = decided_without_photos(SHELF, upright("side", -150, 217))
+    assert found.kind == 2
+    assert found.other is not None
+    assert found.evidence.decided_by == "default"
+
+
+def test_crossing_and_distant_boards_have_no_contact():
+    assert decided_without_photos(SHELF, upright("crossing", -9, 400)) == []
+    assert decided_without_photos(SHELF, upright("short", -9, 60)) == []
+
+
+def test_a_board_whose_end_is_seen_does_not_run_on():
+    """Points on its end face, 12 mm below the shelf, say that it stops there."""
+    high = 188.0
+    cloud = box_cloud(((-9, 0, 0), (9, 100, high)), ((-150, 0, 200), (150, 100, 218)), spacing=3.0)
+    ends = np.flatnonzero((cloud.normals[:, 2] > 0.9) & (cloud.points[:, 2] < 190))
+    short = sheet("short", pose((-9, 0, 0), (0, 1, 0), (0, 0, 1)), 18.0, (0, 0, 100, high), cut_idx=ends)
+    fades = sheet("short", pose((-9, 0, 0), (0, 1, 0), (0, 0, 1)), 18.0, (0, 0, 100, high))
+    blind = SimpleNamespace(views=())
+    free = FreeSpace((), (), 1.0, 1.0)
+    assert find_contacts((SHELF, short), cloud, blind, free, AssembleOptions()) == []
+    assert len(find_contacts((SHELF, fades), cloud, blind, free, AssembleOptions())) == 1
