@@ -23,6 +23,7 @@ __all__ = [
     "HARD_SHAPES",
     "SHAPES",
     "SyntheticOutline",
+    "complaints",
     "edge_points",
     "edge_tangents",
     "loop_nodes",
@@ -128,6 +129,32 @@ def loop_nodes(loop: Loop) -> list[tuple[np.ndarray, bool]]:
         (np.array(edge.start), _angle(tangents[k - 1][1], tangents[k][0]) < SMOOTH_ANGLE)
         for k, edge in enumerate(loop.edges)
     ]
+
+
+def complaints(truth: CutPath, found: CutPath, reach: float = 2.0) -> list[str]:
+    """What is wrong with a fitted path: nodes too many, too few, more than `reach` mm off; wrong kinds."""
+    loops = zip((truth.outer, *truth.holes), (found.outer, *found.holes), strict=True)
+    return [text for a, b in loops for text in _loop_complaints(a, b, reach)]
+
+
+def _loop_complaints(truth: Loop, found: Loop, reach: float) -> list[str]:
+    true_nodes, nodes = loop_nodes(truth), loop_nodes(found)
+    if len(true_nodes) != len(nodes):
+        return [f"{len(nodes)} nodes for {len(true_nodes)}"]
+    if not nodes:
+        return [] if isinstance(found.edges[0], Circle) else ["not a circle"]
+    count = len(nodes)
+    gap = np.array([[np.linalg.norm(a[0] - b[0]) for b in nodes] for a in true_nodes])
+    shift = min(range(count), key=lambda s: sum(gap[i, (i + s) % count] for i in range(count)))
+    wrong = []
+    for i, (true_edge, (_, smooth)) in enumerate(zip(truth.edges, true_nodes, strict=True)):
+        j = (i + shift) % count
+        wrong += [f"node off by {gap[i, j]:.1f} mm"] if gap[i, j] > reach else []
+        wrong += ["smooth for sharp"] if nodes[j][1] and not smooth else []
+        wrong += ["sharp for smooth"] if smooth and not nodes[j][1] else []
+        same = true_edge.kind == found.edges[j].kind
+        wrong += [] if same else [f"{found.edges[j].kind} for {true_edge.kind}"]
+    return wrong
 
 
 def _angle(a: np.ndarray, b: np.ndarray) -> float:

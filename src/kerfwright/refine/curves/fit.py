@@ -10,6 +10,7 @@ import numpy as np
 from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.errors import StageError
 from kerfwright.model import CutPath, Loop
+from kerfwright.refine.curves.bumps import without_bumps
 from kerfwright.refine.curves.candidates import find_candidates
 from kerfwright.refine.curves.chain import Chain, best_chain, unit_price
 from kerfwright.refine.curves.options import CurveFit, CurveOptions, EdgeStatistics
@@ -33,7 +34,7 @@ class _LoopFit:
     samples: Samples
     fit: Fit | None
     circle: tuple[np.ndarray, float, float] | None
-    notes: tuple[str, ...] = ()
+    bumps: tuple[np.ndarray, ...] = ()  # where the boundary was not believed
 
 
 def fit_cut_path(
@@ -97,7 +98,9 @@ def _fit_loop(loop: BoundaryLoop, guides: list[GuideLine], options: CurveOptions
     if not runs and chi2 + 3 * price < chain.cost:
         return _LoopFit(samples, None, (centre, radius, chi2))
     shape = first_shape(chain, samples, guides, options)
-    return _LoopFit(samples, improve(solve(shape, samples, guides), samples, guides, options), None)
+    fit = improve(solve(shape, samples, guides), samples, guides, options)
+    fit, samples, bumps = without_bumps(fit, samples, guides, options)
+    return _LoopFit(samples, fit, None, tuple(bumps))
 
 
 def _chain(samples: Samples, runs: list[Run], guides: list[GuideLine], options: CurveOptions) -> Chain:
@@ -133,12 +136,16 @@ def _result(
     check_path(path)
     return CurveFit(
         path,
-        tuple(note for fit in fits for note in fit.notes),
+        tuple(_bump_note(place + centre) for fit in fits for place in fit.bumps),
         sum(fit.fit.chi2 if fit.fit else fit.circle[2] for fit in fits),
         sum(fit.samples.observations for fit in fits),
         tuple(statistics for _, statistics in made),
         relations,
     )
+
+
+def _bump_note(place: np.ndarray) -> str:
+    return f"a bump of the boundary near ({place[0]:.0f}, {place[1]:.0f}) mm was taken for an artefact and left out"
 
 
 def _finish(

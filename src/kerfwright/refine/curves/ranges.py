@@ -13,13 +13,13 @@ import numpy as np
 
 from kerfwright.refine.curves.samples import Samples
 
-__all__ = ["ARC", "CHOICE", "CUBIC", "LINE", "RangeFits", "fit_circle", "fit_range", "fit_ranges"]
+__all__ = ["ARC", "CHOICE", "CUBIC", "LINE", "RangeFits", "fit_circle", "fit_range", "fit_ranges", "line_chi2"]
 
 LINE, ARC, CUBIC = 0, 1, 2
 FREEDOM = np.array([2.0, 3.0, 6.0])  # of a line, an arc, a cubic between two sharp nodes
 # What an edge costs besides, in the same unit: its node could be anywhere, and a line is the likeliest cut. With this a
 # square end beats a semicircle that fits as well, and one cubic two arcs.
-CHOICE = np.array([1.0, 2.5, 3.5])
+CHOICE = np.array([1.0, 2.75, 3.5])
 _OFFSET_GAIN = np.array([4.0, 9.0, 16.0])  # variance of a fitted polynomial at its end: (degree + 1)^2 / n
 _ANGLE_GAIN = np.array([12.0, 192.0, 1200.0])  # variance of its slope there, times length^2 / n
 _BATCH = 40
@@ -140,6 +140,12 @@ def fit_circle(samples: Samples) -> tuple[np.ndarray, float, float]:
     centre, r2, mse = _taubin(*moments)
     centre, radius = (mean + centre)[0], float(np.sqrt(r2[0]))
     return centre, radius, float(w[0] * mse[0])
+
+
+def line_chi2(samples: Samples, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Chi-square of the best free lines over samples first .. last, all below 2N."""
+    sums = samples.moments[last + 1] - samples.moments[first]
+    return _lines(sums, samples.points[np.column_stack([first, last]) % samples.count])[0]
 
 
 def fit_range(samples: Samples, first: int, last: int, kind: int) -> float:

@@ -72,15 +72,18 @@ def resample(loop: BoundaryLoop, correlation_length: float) -> Samples:
     Raises
     ------
     StageError
-        If the loop has fewer than three different points, or a standard error is not positive.
+        If the loop has fewer than three different points, or a point or standard error makes no sense.
     """
-    points, sigma = _distinct(np.asarray(loop.points, float), np.asarray(loop.standard_error, float))
+    given, errors = np.asarray(loop.points, float), np.broadcast_to(loop.standard_error, len(loop.points))
+    if not np.isfinite(given).all():
+        raise StageError("boundary loop: points: found values that are not finite: give mm in the board frame")
+    if not np.all(errors > 0) or not np.isfinite(errors).all():
+        raise StageError(
+            "boundary loop: standard_error: found values that are not above 0: give mm across the boundary"
+        )
+    points, sigma = _distinct(given, errors)
     if len(points) < 3:
         raise StageError(f"boundary loop: points: {len(points)} different ones found: a loop needs at least 3")
-    if not (np.isfinite(points).all() and np.all(sigma > 0)):
-        raise StageError(
-            "boundary loop: standard_error: found values that are not positive: give mm across the boundary"
-        )
     steps = np.linalg.norm(np.diff(np.vstack([points, points[:1]]), axis=0), axis=1)
     length = np.concatenate([[0.0], np.cumsum(steps)])
     native = float(np.median(steps))
@@ -98,4 +101,4 @@ def resample(loop: BoundaryLoop, correlation_length: float) -> Samples:
 def _distinct(points: np.ndarray, sigma: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Without points that repeat the one before."""
     keep = np.linalg.norm(points - np.roll(points, 1, axis=0), axis=1) > 1e-9
-    return points[keep], np.broadcast_to(sigma, len(points))[keep]
+    return points[keep], sigma[keep]

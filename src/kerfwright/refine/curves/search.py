@@ -14,7 +14,7 @@ import numpy as np
 
 from kerfwright.refine.curves.chain import unit_price
 from kerfwright.refine.curves.options import CurveOptions
-from kerfwright.refine.curves.ranges import ARC, CHOICE, CUBIC, LINE, fit_range
+from kerfwright.refine.curves.ranges import ARC, CHOICE, CUBIC, LINE, fit_range, line_chi2
 from kerfwright.refine.curves.samples import Samples
 from kerfwright.refine.curves.shape import Shape, end_turn
 from kerfwright.refine.curves.snap import GuideLine
@@ -24,20 +24,22 @@ from kerfwright.refine.curves.start import inner_unknowns
 __all__ = ["improve", "score"]
 
 MOST_TRIALS = 40
+LONGEST_SPLIT = 60.0  # mm: longer curves are no corners
 MOST_TURN = 0.7  # radians: a sharp node that turns more is not tried smooth
 
 
 @dataclass(frozen=True)
 class _Move:
-    """Edges first .. first + count - 1 (round the loop) become one edge of a kind, or node `first` changes
-    smoothness.
+    """Edges first .. first + count - 1 (round the loop) become one edge of a kind.
+
+    With no edges node `first` becomes smooth; with `split`, a sample, edge `first` becomes two lines that meet there.
     """
 
     first: int
     count: int
     kind: int
     gain: float  # estimated
-    smooth: tuple[bool, bool] | None = None  # of both ends, where the move sets them
+    split: int = -1
 
 
 def score(fit: Fit, samples: Samples, options: CurveOptions) -> float:
@@ -94,11 +96,11 @@ def _with_ranges(shape: Shape, samples: Samples) -> Shape:
 
 def _key(shape: Shape, move: _Move) -> tuple:
     nodes = tuple(round(shape.ranges[(move.first + i) % shape.count][0] / 8) for i in range(move.count + 1))
-    return (nodes, move.kind, move.smooth, shape.count)
+    return (nodes, move.kind, move.split >= 0, shape.count)
 
 
 def _moves(fit: Fit, samples: Samples, options: CurveOptions) -> list[_Move]:
-    found = [*_smoothings(fit, samples, options), *_merges(fit, samples, options)]
+    found = [*_smoothings(fit, samples, options), *_merges(fit, samples, options), *_splits(fit, samples, options)]
     return sorted((m for m in found if m.gain > 0), key=lambda m: (-m.gain, m.first, m.count, m.kind))
 
 
@@ -135,6 +137,21 @@ def _merges(fit: Fit, samples: Samples, options: CurveOptions) -> Iterator[_Move
                 yield _Move(first, count, kind, gain)
 
 
+def _splits(fit: Fit, samples: Samples, options: CurveOptions) -> Iterator[_Move]:
+    """Short curves that may be corners of two lines: dynamic programming only has the corners that it was offered."""
+    shape, price = fit.shape, unit_price(samples, options)
+    now = np.bincount(fit.edge, samples.weight * fit.distance**2, minlength=shape.count)
+    for k, (first, last) in enumerate(shape.ranges):
+        at = np.arange(first + 2, last - 1)
+        if shape.kinds[k] == LINE or (last - first) * samples.spacing > LONGEST_SPLIT or not len(at):
+            continue
+        ends = np.full(len(at), first), np.full(len(at), min(last, 2 * samples.count - 1))
+        both = line_chi2(samples, ends[0], at) + line_chi2(samples, at, ends[1])
+        best = int(both.argmin())
+        paid = now[k] + price * (_charge(shape.kinds[k]) - shape.smooth[k] - shape.smooth[(k + 1) % shape.count])
+        yield _Move(k, 1, LINE, paid - float(both[best]) - price * (2 * _charge(LINE) - 1), int(at[best]))
+
+
 def _charge(kind: int) -> float:
     return (2.0, 3.0, 6.0)[kind] + float(CHOICE[kind])
 
@@ -150,6 +167,8 @@ def _applied(shape: Shape, move: _Move, samples: Samples) -> Shape:
     if move.count == 0:
         smooth = tuple(s or k == move.first for k, s in enumerate(shape.smooth))
         return Shape(shape.unknowns, shape.kinds, shape.lines, smooth, shape.ranges)
+    if move.split >= 0:
+        return _halved(shape, move, samples)
     n = shape.count
     order = [(move.first + i) % n for i in range(n)]
     kept = order[move.count :]
@@ -166,3 +185,19 @@ def _applied(shape: Shape, move: _Move, samples: Samples) -> Shape:
 
 def _both_lines(kinds: tuple[int, ...], i: int) -> bool:
     return kinds[i] == LINE and kinds[i - 1] == LINE
+
+
+def _halved(shape: Shape, move: _Move, samples: Samples) -> Shape:
+    """Edge `move.first` as two lines with a sharp node between them."""
+    k, n = move.first, shape.count
+    order = [k, -1, *((k + 1 + i) % n for i in range(n - 1))]
+    first, last = shape.ranges[k]
+    ranges = ((first, move.split), (move.split % samples.count, move.split % samples.count + last - move.split))
+    nodes = [shape.node(k), samples.points[move.split % samples.count], *(shape.node(i) for i in order[2:])]
+    kinds = (LINE, LINE, *(shape.kinds[i] for i in order[2:]))
+    smooth = tuple(i >= 0 and shape.smooth[i] and not _both_lines(kinds, at) for at, i in enumerate(order))
+    lines = (-1, -1, *(shape.lines[i] for i in order[2:]))
+    inner = [shape.unknowns[shape.extra(i)] for i in order[2:]]
+    return Shape(
+        np.concatenate([*nodes, *inner]), kinds, lines, smooth, (*ranges, *(shape.ranges[i] for i in order[2:]))
+    )

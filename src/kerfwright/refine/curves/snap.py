@@ -16,7 +16,10 @@ from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.refine.curves.options import CurveOptions
 from kerfwright.refine.curves.samples import Samples
 
-__all__ = ["GuideLine", "Run", "find_runs", "guide_lines"]
+__all__ = ["GuideLine", "Run", "find_runs", "guide_lines", "is_bump"]
+
+STEEP = np.radians(50.0)  # sides of a saw's notch are steeper, those of a shadow are not
+_SIDE = 2.0  # mm: half the chord along which the slope of a side is taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +128,7 @@ def _bridged(runs: list[Run], samples: Samples, lines: Sequence[GuideLine], opti
     while len(merged) > 1 and k < len(merged):
         a, b = merged[k], merged[(k + 1) % len(merged)]
         first = b.first + (samples.count if b.first <= a.last else 0)
-        if a.line == b.line and _is_bump(samples, lines[a.line], a.last, first, options):
+        if a.line == b.line and is_bump(samples, a.last, first, lines[a.line].direction, lines[a.line].offset, options):
             joined = Run(a.line, a.first, b.last + first - b.first)
             merged[k] = joined
             del merged[(k + 1) % len(merged)]
@@ -135,11 +138,17 @@ def _bridged(runs: list[Run], samples: Samples, lines: Sequence[GuideLine], opti
     return sorted(merged, key=lambda r: r.first)
 
 
-def _is_bump(samples: Samples, line: GuideLine, last: int, first: int, options: CurveOptions) -> bool:
-    """Whether what lies between two runs is short, shallow and without steep sides."""
-    between = np.arange(last, first + 1) % samples.count
-    along = samples.points[between] @ line.direction
-    depth = np.abs(samples.points[between] @ line.normal - line.offset).max()
+def is_bump(
+    samples: Samples, first: int, last: int, direction: np.ndarray, offset: float, options: CurveOptions
+) -> bool:
+    """Whether samples first .. last leave the line with left normal `direction` turned by 90 degrees only as a bump
+    does.
+    """
+    between = np.arange(first, last + 1) % samples.count
+    along = samples.points[between] @ direction
+    depth = np.abs(samples.points[between] @ np.array([-direction[1], direction[0]]) - offset).max()
     chord = along[-1] - along[0]
-    steep = len(between) * samples.spacing > 1.35 * chord + 2 * samples.spacing
-    return bool(0 <= chord <= options.bump_length and depth <= options.bump_depth and not steep)
+    if not 0 <= chord <= options.bump_length or depth > options.bump_depth:
+        return False
+    inside = samples.directions(_SIDE)[between]
+    return bool((inside @ direction).min() > np.cos(STEEP))
