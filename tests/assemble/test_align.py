@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from clouds import sheet, turned
 
+from clouds import sheet, turned
 from kerfwright.assemble import AssembleOptions
 from kerfwright.assemble.align import align_sheets
 from kerfwright.capture.types import Cloud

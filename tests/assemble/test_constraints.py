@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from clouds import pose, sheet, turned
 
+from clouds import pose, sheet, turned
 from kerfwright.assemble import AssembleOptions
 from kerfwright.assemble.constraints import constraint_segments
 from kerfwright.assemble.contacts import Decided
@@ -36,7 +36,7 @@ def left_of(segment, point) -> float:
 
 
 def test_the_board_that_ends_gets_a_segment_on_the_other_ones_plane():
-    sheets, (shelf, (contact, _)) = tee()
+    _, (shelf, (contact, _)) = tee()
     assert shelf == ()
     assert (contact.origin, contact.contact) == ("contact", 0)
     ends = UPRIGHT.to_world(np.array([[*contact.start, 0.0], [*contact.end, 0.0]]))

@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from clouds import box_cloud, cloud_only, pose, shelf_capture, shelf_parts, sheet
 from shapely.geometry import Polygon
 
+from clouds import box_cloud, cloud_only, pose, sheet, shelf_capture, shelf_parts
 from kerfwright.assemble import AssembleOptions, assemble
 from kerfwright.assemble.contacts import find_contacts, to_contact
 from kerfwright.identify.freespace import FreeSpace

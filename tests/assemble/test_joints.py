@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from clouds import pose, sheet, turned
 from shapely.geometry import box
 
+from clouds import pose, sheet, turned
 from kerfwright.assemble.joints import Search, columns, end_on, face_plane, runs_of, trace_of
 
 REACH, SLACK, STEP = 15.0, 6.0, 2.0

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from clouds import pose, sheet
 
+from clouds import pose, sheet
 from kerfwright.assemble import AssembleOptions
 from kerfwright.assemble.stock import share_thickness
 from kerfwright.model import Origin, Quantity

@@ -21,9 +21,8 @@ def wall(facing: float = -1.0) -> Cloud:
 
 
 def free_space(cloud: Cloud, *centres: tuple[float, float, float]):
-    views = tuple(
-        View(f"{k}", Path(f"{k}.png"), CAMERA, looking_at(np.array(c, float), np.zeros(3))) for k, c in enumerate(centres)
-    )
+    poses = [looking_at(np.array(centre, float), np.zeros(3)) for centre in centres]
+    views = tuple(View(f"{k}", Path(f"{k}.png"), CAMERA, pose) for k, pose in enumerate(poses))
     return see_through(Capture("wall", views, cloud, Scale(millimetres_per_unit=1.0)), SPACING, margin=5.0)
 
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from clouds import box_cloud, cloud_only, shelf_parts, with_flipped
 
+from clouds import box_cloud, cloud_only, shelf_parts, with_flipped
 from kerfwright.capture.types import Cloud
 from kerfwright.errors import StageError
 from kerfwright.identify import identify
@@ -25,7 +25,7 @@ def only(cloud: Cloud, keep: np.ndarray) -> Cloud:
 
 
 def stacked(cloud: Cloud, *heights: float) -> Cloud:
-    points = [cloud.points + [0, 0, h] for h in heights]
+    points = [cloud.points + np.array([0, 0, h]) for h in heights]
     return Cloud(np.concatenate(points), np.tile(cloud.normals, (len(heights), 1)))
 
 
@@ -80,7 +80,8 @@ def test_strays_of_five_percent(table):
     points = rng.uniform([-160, -110, -10], [160, 110, 230], (count, 3))
     normals = rng.standard_normal((count, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    assert_is_table(sheets_of(Cloud(np.concatenate([table.points, points]), np.concatenate([table.normals, normals]))))
+    strayed = Cloud(np.concatenate([table.points, points]), np.concatenate([table.normals, normals]))
+    assert_is_table(sheets_of(strayed))
 
 
 def test_two_objects_apart():
@@ -89,7 +90,7 @@ def test_two_objects_apart():
 
 
 def test_parallel_planes_are_boards_where_they_face_apart(board):
-    """Top and bottom alone, no cut face seen: the opposite plane is evidence enough; the air between two boards is none."""
+    """Top and bottom alone: the opposite plane is evidence enough; the air between two boards is none."""
     faces = only(board, np.abs(board.normals[:, 2]) > 0.5)
     sheets = sheets_of(stacked(faces, 0, 60))
     assert [round(s.thickness.value, 1) for s in sheets] == [20.0, 20.0]
@@ -102,7 +103,9 @@ def ball() -> Cloud:
 
 
 BAD = {
-    "one plane, from above, high over the floor": (lambda b: stacked(only(b, b.normals[:, 2] > 0.5), 300), "no plane has a thickness"),
+    "one plane, from above, high over the floor": (
+        lambda b: stacked(only(b, b.normals[:, 2] > 0.5), 300), "no plane has a thickness",
+    ),
     "a ball": (lambda b: ball(), "no plane has a thickness"),
     "a cube, thin in no direction": (
         lambda b: box_cloud(((-100, -100, 0), (100, 100, 200)), spacing=5.0), "no plane has a thickness",

@@ -67,7 +67,7 @@ def test_only_views_that_see_the_places_are_asked(tmp_path):
 def test_no_view_no_answer(tmp_path):
     photos = photos_of(tmp_path)
     assert sweep_edge(photos, PLACES, ALONG_X, OFFSETS, np.zeros((6, len(PLACES)), bool)) is None
-    outside = PLACES + [1000, 0, 0]
+    outside = PLACES + np.array([1000, 0, 0])
     assert sweep_edge(photos, outside, ALONG_X, OFFSETS, np.ones((6, len(PLACES)), bool)) is None
 
 

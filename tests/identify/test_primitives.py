@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
-from clouds import box_cloud, with_flipped
 
+from clouds import box_cloud, with_flipped
 from kerfwright.capture.types import Cloud
 from kerfwright.errors import StageError
 from kerfwright.identify import IdentifyOptions

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from clouds import box_cloud, pose
 from shapely.geometry import box
 
+from clouds import box_cloud, pose
 from kerfwright.identify import IdentifyOptions
 from kerfwright.identify.primitives import look_around
 from kerfwright.identify.selection import Evidence, gather_evidence, select_exact
@@ -79,11 +79,11 @@ def test_order_of_the_candidates_does_not_matter():
     owner = rng.integers(0, 12, 1000)
     by_sheet = np.array([(owner == k) | (owner == (k + 1) % 12) for k in range(12)])
     interior = [held(k, 12, **{f"_{(k + 1) % 12}": (0, int(rng.integers(20, 70)))}) for k in range(12)]
-    evidence = Evidence(np.zeros((1000, 3)), by_sheet, ~by_sheet & False, rng.uniform(0.005, 0.01, 12), tuple(interior))
+    no_cut = np.zeros_like(by_sheet)
+    evidence = Evidence(np.zeros((1000, 3)), by_sheet, no_cut, rng.uniform(0.005, 0.01, 12), tuple(interior))
     order = rng.permutation(12)
-    shuffled = Evidence(
-        evidence.places, by_sheet[order], evidence.by_cut, evidence.cost[order], tuple(interior[k][:, order] for k in order)
-    )
+    held_by = tuple(interior[k][:, order] for k in order)
+    shuffled = Evidence(evidence.places, by_sheet[order], no_cut, evidence.cost[order], held_by)
     first, again, other = (select_exact(e, OPTIONS) for e in (evidence, evidence, shuffled))
     assert first == again
     assert {int(order[k]) for k in other.chosen} == set(first.chosen)

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from clouds import box_cloud, pose
 from shapely.geometry import box
 
+from clouds import box_cloud, pose
 from kerfwright.identify import IdentifyOptions
 from kerfwright.identify.primitives import look_around
 from kerfwright.identify.sheets import join_across, to_sheet

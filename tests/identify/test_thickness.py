@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from clouds import box_cloud, pose, shelf_capture
 from shapely.geometry import box
 
+from clouds import box_cloud, pose, shelf_capture
 from kerfwright.identify import IdentifyOptions
 from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.primitives import find_planes, look_around

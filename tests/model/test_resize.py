@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from simple import bevel, board, hole, placed, rectangle, stool
 
 from kerfwright.model import Bevel, Quantity
 from kerfwright.model.frames import matrix
 from kerfwright.model.resize import resized_board, resized_contact
+from simple import bevel, board, hole, placed, rectangle, stool
 
 SCALE = 2.7
 

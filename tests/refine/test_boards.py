@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
-from clouds import pose, sheet, turned
-from simple import polygon
 
+from clouds import pose, sheet, turned
 from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.model import Circle, CutPath, Loop
 from kerfwright.model.frames import matrix
 from kerfwright.model.geometry import sample_loop, signed_area
 from kerfwright.refine.boards import to_board
+from simple import polygon
 
 UPRIGHT = pose((30, 40, 50), (0, 1, 0), (0, 0, 1))
 
@@ -86,7 +86,8 @@ def test_a_slanted_segment_becomes_a_bevel(degrees):
 
 def test_a_segment_that_no_edge_follows_makes_no_bevel():
     away = slanted(15.0)
-    moved = ConstraintSegment(away.start + [0, 5], away.end + [0, 5], "contact", 0.15, away.normal, 0.0, contact=3)
+    shift = np.array([0.0, 5.0])
+    moved = ConstraintSegment(away.start + shift, away.end + shift, "contact", 0.15, away.normal, 0.0, contact=3)
     assert made(SHAPE, segments=(moved,)).bevels == ()
 
 

@@ -78,7 +78,8 @@ def sheet(name: str, frame: np.ndarray, thickness: float, region: Polygon | tupl
 def shelf_capture() -> Capture:
     """The tiny assembly with enough photographs and points for the stages that look for boards."""
     cloud = replace(TINY.cloud, points=20_000, views=2)
-    return in_memory(tiny_assembly(), replace(TINY, dataset=DatasetOptions(images=16, width=320, height=240), cloud=cloud))
+    dataset = DatasetOptions(images=16, width=320, height=240)
+    return in_memory(tiny_assembly(), replace(TINY, dataset=dataset, cloud=cloud))
 
 
 @lru_cache(maxsize=1)

@@ -1,7 +1,7 @@
 """Planes in an oriented cloud, by region growing over its neighbour graph and robust refits.
 
 The paper uses Efficient RANSAC (Primitive Detection and Adjacency). Growing from the flattest neighbourhoods finds the same
-connected plane patches in one deterministic pass: see docs/identify.md for the comparison.
+connected plane patches in one deterministic pass: see docs/method.md.
 """
 
 from __future__ import annotations

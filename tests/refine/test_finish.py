@@ -1,0 +1,67 @@
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from shapely.geometry import Polygon, box
+
+from clouds import pose, sheet
+from kerfwright.assemble.types import Assembly, ConstraintSegment
+from kerfwright.errors import StageError
+from kerfwright.model import Finding, Line
+from kerfwright.model.geometry import edge_length, path_polygon
+from kerfwright.refine import BoundaryLoop, Outline, RefineOptions, finish
+
+CAPTURE = SimpleNamespace(cloud=SimpleNamespace(diameter=450.0))  # a boundary point every millimetre
+TOP_EDGE = ConstraintSegment(np.array([200.0, 120]), np.array([0.0, 120]), "contact", 0.15, contact=0)
+
+
+def outline_of(region: Polygon, error: float = 0.3) -> Outline:
+    points = np.asarray(region.segmentize(1.0).exterior.coords)[:-1]
+    return Outline((BoundaryLoop(points, np.full(len(points), error)),), "images", views=5)
+
+
+def finished(region: Polygon, *segments: ConstraintSegment, findings=()):
+    rough = sheet("board_01", pose((0, 0, 50)), 18.0, region)
+    assembly = Assembly((rough,), (), (segments,), findings)
+    return finish.finished((outline_of(region),), assembly, CAPTURE, RefineOptions())
+
+
+def test_a_traced_rectangle_becomes_four_lines_that_end_on_their_segment():
+    """Traced 2 mm short of the contact."""
+    refined = finished(box(0, 0, 200, 118), TOP_EDGE)
+    (board,) = refined.boards
+    assert all(isinstance(e, Line) for e in board.cut_path.outer.edges)
+    assert sorted(edge_length(e) for e in board.cut_path.outer.edges) == pytest.approx([120, 120, 200, 200], abs=0.05)
+    assert board.outline_origin == "images"
+    assert refined.findings == ()
+
+
+def test_a_boundary_that_cannot_be_fitted_becomes_a_polygon_and_says_so(monkeypatch):
+    def fails(loops, segments):
+        raise StageError("curves: too rough")
+
+    monkeypatch.setattr(finish, "fit_curves", fails)
+    refined = finished(box(0, 0, 200, 118), TOP_EDGE)
+    (finding,) = refined.findings
+    assert (finding.code, finding.severity, finding.boards) == ("K010", "warning", ("board_01",))
+    assert "curves: too rough" in finding.message
+    assert path_polygon(refined.boards[0].cut_path).area == pytest.approx(200 * 120, rel=1e-3)
+    assert refined.boards[0].notes
+
+
+def test_findings_of_the_assembly_are_handed_on():
+    known = Finding(code="K002", severity="info", message="seen")
+    assert finished(box(0, 0, 200, 120), findings=(known,)).findings[0] == known
+
+
+def test_polygon_path_keeps_holes_and_runs_the_right_way():
+    region = box(0, 0, 100, 80).difference(box(30, 30, 50, 50))
+    path = finish.polygon_path(region, 0.5)
+    assert path_polygon(path).symmetric_difference(region).area == pytest.approx(0, abs=1e-9)
+    assert len(path.outer.edges) == 4
+    assert len(path.holes) == 1
+
+
+def test_polygon_path_drops_what_is_within_the_tolerance():
+    wavy = Polygon([(x, 0.2 * (k % 2)) for k, x in enumerate(np.arange(0, 101, 2.0))] + [(100, 80), (0, 80)])
+    assert len(finish.polygon_path(wavy, 0.5).outer.edges) == 4
