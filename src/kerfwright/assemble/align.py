@@ -36,7 +36,9 @@ class PlaneEvidence:
 UPRIGHT = PlaneEvidence(np.array([0.0, 0, 1]), np.zeros(3), np.diag([1.0, 1.0, 0.0]), 1.0, float(np.radians(0.5)), 1e-3)
 
 
-def align_sheets(sheets: tuple[Sheet, ...], cloud: Cloud, options: AssembleOptions) -> tuple[tuple[Sheet, ...], np.ndarray]:
+def align_sheets(
+    sheets: tuple[Sheet, ...], cloud: Cloud, options: AssembleOptions
+) -> tuple[tuple[Sheet, ...], np.ndarray]:
     """Sheets with aligned normals and offsets, and (B,) their angular standard errors in radians.
 
     Raises StageError when the constrained fit does not converge.
@@ -44,15 +46,21 @@ def align_sheets(sheets: tuple[Sheet, ...], cloud: Cloud, options: AssembleOptio
     evidence = [_evidence(sheet, cloud) for sheet in sheets]
     classes = _direction_classes([*evidence, UPRIGHT], options)
     directions = _fit_directions([*evidence, UPRIGHT], classes, options)
-    moved = tuple(_moved(sheet, e, directions[c], cloud) for sheet, e, c in zip(sheets, evidence, classes[:-1], strict=True))
+    moved = tuple(
+        _moved(sheet, e, directions[c], cloud) for sheet, e, c in zip(sheets, evidence, classes[:-1], strict=True)
+    )
     return moved, np.array([e.angle_error for e in evidence])
 
 
 def _evidence(sheet: Sheet, cloud: Cloud) -> PlaneEvidence:
     """Robust planes of both sides, each counted by its noise; the other side's normal is turned over."""
-    sides = [(cloud.points[idx], sign) for idx, sign in ((sheet.top_idx, 1.0), (sheet.bottom_idx, -1.0)) if len(idx) >= 30]
+    sides = [
+        (cloud.points[idx], sign) for idx, sign in ((sheet.top_idx, 1.0), (sheet.bottom_idx, -1.0)) if len(idx) >= 30
+    ]
     if not sides:
-        return PlaneEvidence(sheet.normal, sheet.to_world(np.array([[0, 0, sheet.thickness.value]]))[0], np.eye(3), 1.0, 0.05, 1.0)
+        return PlaneEvidence(
+            sheet.normal, sheet.to_world(np.array([[0, 0, sheet.thickness.value]]))[0], np.eye(3), 1.0, 0.05, 1.0
+        )
     fits = [(*plane_fit(points, sign * sheet.normal), points, sign) for points, sign in sides]
     total, weights = np.zeros((3, 3)), []
     for normal, _, centre, sigma, points, _ in fits:

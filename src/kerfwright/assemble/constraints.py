@@ -51,7 +51,9 @@ def _pointed(sheets: tuple[Sheet, ...], decided: list[Decided]) -> list[Trace]:
     return traces
 
 
-def _segments(trace: Trace, intervals: tuple[tuple[float, float], ...], origin: str, contact: int | None) -> list[ConstraintSegment]:
+def _segments(
+    trace: Trace, intervals: tuple[tuple[float, float], ...], origin: str, contact: int | None
+) -> list[ConstraintSegment]:
     """Directed so that the wood lies on the left."""
     slanted = abs(trace.slope) > 1e-3
     return [

@@ -52,7 +52,9 @@ class _Scene:
     def search(self, cover: float) -> Search:
         """Where joints are looked for when a's wood may go on so far (a fraction of D) beyond its outline."""
         o = self.options
-        return Search(self.mm(o.far_reach), self.mm(o.outline_error), self.mm(cover), self.mm(1 / 200), self.mm(o.min_contact))
+        return Search(
+            self.mm(o.far_reach), self.mm(o.outline_error), self.mm(cover), self.mm(1 / 200), self.mm(o.min_contact)
+        )
 
 
 def find_contacts(
@@ -114,7 +116,9 @@ def _end_is_seen(scene: _Scene, joint: Joint) -> bool:
 
 def _unfinished(scene: _Scene, joint: Joint | None) -> Joint | None:
     """A far joint whose board just fades out: no cut face ends it, and nobody saw through the gap."""
-    if joint is None or joint.gap > scene.mm(scene.options.unseen_reach) or joint.length < scene.mm(scene.options.reach):
+    if joint is None or joint.gap > scene.mm(
+        scene.options.unseen_reach
+    ) or joint.length < scene.mm(scene.options.reach):
         return None
     if _end_is_seen(scene, joint) or _gap_is_free(scene, joint):
         return None
@@ -152,7 +156,9 @@ def _seam(scene: _Scene, joint: Joint, face: str) -> Seam:
 
 def _confirmed(scene: _Scene, joint: Joint | None) -> Decided | None:
     """A far joint that the photographs confirm: the first strong edge beyond the outline is at the plane."""
-    if joint is None or joint.length < scene.mm(scene.options.reach) or _end_is_seen(scene, joint) or _gap_is_free(scene, joint):
+    if joint is None or joint.length < scene.mm(
+        scene.options.reach
+    ) or _end_is_seen(scene, joint) or _gap_is_free(scene, joint):
         return None
     end = look_for_end(scene.sheets, joint, scene.photos, scene.obstacles, scene.mm(1 / 300))
     if end is None or end.views < 3 or end.score < scene.options.end_score:
@@ -206,7 +212,9 @@ def _swapped(e: ContactEvidence) -> ContactEvidence:
 
 def _alike(scene: _Scene, one: Joint, other: Joint) -> int:
     """1 when the boards of two joints have the same sizes in the same roles."""
-    return int(_same_size(scene.sheets[one.a], scene.sheets[other.a]) and _same_size(scene.sheets[one.b], scene.sheets[other.b]))
+    return int(_same_size(
+        scene.sheets[one.a], scene.sheets[other.a]
+    ) and _same_size(scene.sheets[one.b], scene.sheets[other.b]))
 
 
 def _same_size(a: Sheet, b: Sheet) -> bool:
@@ -231,14 +239,18 @@ def to_contact(decided: Decided, sheets: tuple[Sheet, ...]) -> Contact:
     angle = float(np.degrees(np.arcsin(min(joint.trace.sine, 1.0))))
     return Contact(
         type=decided.kind, a=a.name, b=b.name, face_a=joint.face_a, face_b="edge",
-        point=_point(normal * offset), normal=_point(normal), interface=polygons, area=joint.length * width, angle=angle,
+        point=_point(
+            normal * offset
+        ), normal=_point(normal), interface=polygons, area=joint.length * width, angle=angle,
         bevelled=abs(joint.trace.slope) > 1e-3, evidence=decided.evidence,
     )
 
 
 def _rectangle(joint: Joint, b: Sheet, interval: tuple[float, float]) -> tuple:
     corners = []
-    for along, z in ((interval[0], 0.0), (interval[1], 0.0), (interval[1], b.thickness.value), (interval[0], b.thickness.value)):
+    for along, z in (
+        (interval[0], 0.0), (interval[1], 0.0), (interval[1], b.thickness.value), (interval[0], b.thickness.value)
+    ):
         shift = joint.trace.slope * (z - joint.trace.depth)
         xy = joint.trace.place(np.array([shift]), np.array([along]))[0]
         corners.append(_point(b.to_world(np.array([[*xy, z]]))[0]))

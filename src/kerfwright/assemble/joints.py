@@ -128,7 +128,9 @@ def columns(region: Polygon, trace: Trace, step: float) -> tuple[np.ndarray, np.
     inside, position = trace.coordinates(ring)
     along = np.arange(position.min() + step / 2, position.max(), step)
     low, high = inside.min() - 1, inside.max() + 1
-    lines = shapely.linestrings(np.stack([trace.place(np.full(len(along), low), along), trace.place(np.full(len(along), high), along)], axis=1))
+    lines = shapely.linestrings(
+        np.stack([trace.place(np.full(len(along), low), along), trace.place(np.full(len(along), high), along)], axis=1)
+    )
     first, last = np.full(len(along), np.nan), np.full(len(along), np.nan)
     for k, cut in enumerate(shapely.intersection(lines, region)):
         xy = shapely.get_coordinates(cut)
@@ -149,7 +151,9 @@ def _has_wood(one: Sheet, other: Sheet, trace: Trace, along: np.ndarray, reach: 
     return shapely.contains_xy(one.region.buffer(reach), in_a[:, 0], in_a[:, 1])
 
 
-def runs_of(along: np.ndarray, ends: np.ndarray, step: float, shortest: float, joining: float) -> tuple[tuple[float, float], ...]:
+def runs_of(
+    along: np.ndarray, ends: np.ndarray, step: float, shortest: float, joining: float
+) -> tuple[tuple[float, float], ...]:
     """Runs of columns that end on the plane, small gaps joined, short runs dropped."""
     if not ends.any():
         return ()
@@ -157,4 +161,6 @@ def runs_of(along: np.ndarray, ends: np.ndarray, step: float, shortest: float, j
     breaks = np.flatnonzero(np.diff(places) > max(joining, 1.5 * step))
     starts = np.r_[places[0], places[breaks + 1]]
     stops = np.r_[places[breaks], places[-1]]
-    return tuple((float(a - step / 2), float(b + step / 2)) for a, b in zip(starts, stops, strict=True) if b - a + step >= shortest)
+    return tuple((
+        float(a - step / 2), float(b + step / 2)
+    ) for a, b in zip(starts, stops, strict=True) if b - a + step >= shortest)

@@ -17,7 +17,8 @@ from kerfwright.identify.types import Sheet
 
 __all__ = ["Seam", "look_for_end", "look_for_seam"]
 
-UNSEEN_SCORE = 1.5  # a seam that no photograph shows: less than any clear seam, more than a clear face (paper: low, not zero)
+# a seam that no photograph shows: less than any clear seam, more than a clear face (paper: low, not zero)
+UNSEEN_SCORE = 1.5
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,9 @@ class Seam:
     offset: float = 0.0  # mm from the expected place
 
 
-def look_for_seam(sheets: tuple[Sheet, ...], joint: Joint, face: str, photos: Photos, obstacles: Obstacles, window: float) -> Seam:
+def look_for_seam(
+    sheets: tuple[Sheet, ...], joint: Joint, face: str, photos: Photos, obstacles: Obstacles, window: float
+) -> Seam:
     """Score of the line on a sheet face of b in which the joint's plane cuts it. window: mm that the line may be off."""
     sweep = _sweep(sheets[joint.b], joint, face, photos, obstacles, -8 * window, 8 * window)
     if sweep is None:

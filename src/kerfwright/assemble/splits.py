@@ -39,7 +39,9 @@ class SeamLine:
     views: int
 
 
-def find_seam_lines(sheet: Sheet, touching: list[Sheet], photos: Photos, obstacles: Obstacles, diameter: float) -> list[SeamLine]:
+def find_seam_lines(
+    sheet: Sheet, touching: list[Sheet], photos: Photos, obstacles: Obstacles, diameter: float
+) -> list[SeamLine]:
     """Seams across a board in the direction that shows the strongest one, in order along it."""
     ring = np.asarray(sheet.region.minimum_rotated_rectangle.exterior.coords)
     first = (ring[1] - ring[0]) / np.linalg.norm(ring[1] - ring[0])
@@ -73,16 +75,22 @@ def _seams_across(
     visible = np.all([obstacles.visible(photos.views, line(level), outward, 0.35) for level in levels], axis=0)
     visible[np.argsort(-visible.sum(axis=1), kind="stable")[MOST_VIEWS:]] = False
     middle = float(offsets.mean())
-    sweep = sweep_edge(photos, line(middle), sheet.world_from_board[:3, :2] @ m, offsets - middle, visible, smoothing=diameter / 600)
+    sweep = sweep_edge(
+        photos, line(middle), sheet.world_from_board[:3, :2] @ m, offsets - middle, visible, smoothing=diameter / 600
+    )
     if sweep is None or sweep.views < LEAST_VIEWS:
         return []
     strength = sweep.strength / np.median(sweep.strength)
     known = _known_lines(sheet, m, touching)
     ends = [along.min(), along.max()]
     return [
-        SeamLine(m, float(offsets[k]), offsets[k] * m + ends[0] * tangent, offsets[k] * m + ends[1] * tangent, float(strength[k]), sweep.views)
+        SeamLine(m, float(offsets[k]), offsets[k] * m + ends[0] * tangent, offsets[k] * m + ends[1] * tangent, float(
+            strength[k]
+        ), sweep.views)
         for k in _peaks(strength, sweep.persistence, reach=round(margin / (offsets[1] - offsets[0])))
-        if all(abs(offsets[k] - other) > margin / 2 for other in known) and _crosses_all(sheet.region, m, offsets[k], margin / 4)
+        if all(
+            abs(offsets[k] - other) > margin / 2 for other in known
+        ) and _crosses_all(sheet.region, m, offsets[k], margin / 4)
     ]
 
 
@@ -129,7 +137,9 @@ def split_sheet(sheet: Sheet, seams: list[SeamLine], points: np.ndarray) -> list
         strip = Polygon([a * m + b * tangent for a, b in ((low, -1e5), (high, -1e5), (high, 1e5), (low, 1e5))])
         region = sheet.region.intersection(strip)
         region = max(getattr(region, "geoms", [region]), key=lambda p: p.area)
-        own = [idx[_between(sheet, points[idx], m, low, high)] for idx in (sheet.top_idx, sheet.bottom_idx, sheet.cut_idx)]
+        own = [
+            idx[_between(sheet, points[idx], m, low, high)] for idx in (sheet.top_idx, sheet.bottom_idx, sheet.cut_idx)
+        ]
         pieces.append(replace(sheet, region=region, top_idx=own[0], bottom_idx=own[1], cut_idx=own[2]))
     return pieces
 
@@ -154,7 +164,9 @@ def seam_contact(before: Sheet, after: Sheet, seam: SeamLine) -> Contact:
     places = before.to_world(np.array(corners))
     normal = before.world_from_board[:3, :2] @ seam.m
     return Contact(
-        type=4, a=before.name, b=after.name, face_a="edge", face_b="edge", point=_point(places[0]), normal=_point(normal),
+        type=4, a=before.name, b=after.name, face_a="edge", face_b="edge", point=_point(
+            places[0]
+        ), normal=_point(normal),
         interface=(tuple(_point(p) for p in places),), area=float(np.linalg.norm(seam.end - seam.start) * t), angle=0.0,
         evidence=ContactEvidence(seam_score=seam.strength, views=seam.views, decided_by="seam"),
     )

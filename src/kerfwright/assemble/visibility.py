@@ -30,7 +30,9 @@ class Obstacles:
                     o3d.core.Tensor(sheet.to_world(corners).astype(np.float32)), o3d.core.Tensor(triangles)
                 )
 
-    def visible(self, views: Sequence[View], places: np.ndarray, outward: np.ndarray, grazing: float = 0.2) -> np.ndarray:
+    def visible(
+        self, views: Sequence[View], places: np.ndarray, outward: np.ndarray, grazing: float = 0.2
+    ) -> np.ndarray:
         """(V, N) bool: views from which (N, 3) places are seen at all and from their outer side.
 
         outward (3,) or (N, 3): the surface normal there; grazing: least cosine between it and the line of sight.

@@ -29,7 +29,9 @@ def identify(capture: Capture, options: IdentifyOptions | None = None) -> Parts:
     free = see_through(capture, around.spacing, max(5 * around.noise, cloud.diameter / 150))
     slabs = candidate_slabs(capture, around, planes, free, Photos(capture), options)
     if not slabs:
-        raise StageError("cloud: no plane has a thickness that a board could have: photograph the edges of the boards too")
+        raise StageError(
+            "cloud: no plane has a thickness that a board could have: photograph the edges of the boards too"
+        )
     selection = select_exact(gather_evidence(cloud, around, slabs, options), options)
     if not selection.chosen:
         raise StageError("cloud: no set of boards explains it: check that the cloud shows one wooden object, cropped")

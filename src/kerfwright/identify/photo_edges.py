@@ -86,7 +86,9 @@ def sweep_edge(
     return _combine(np.array([c for _, c in curves]), [k for k, _ in curves], offsets)
 
 
-def _view_curves(photos: Photos, k: int, grid: np.ndarray, own: np.ndarray, chunk: int, sigma: float) -> list[tuple[int, np.ndarray]]:
+def _view_curves(
+    photos: Photos, k: int, grid: np.ndarray, own: np.ndarray, chunk: int, sigma: float
+) -> list[tuple[int, np.ndarray]]:
     """Edge strength over the offsets, one curve a chunk of places, in units of the curve's own median."""
     view = photos.views[k]
     pixels, _ = view.project(grid.reshape(-1, 3))
@@ -111,7 +113,9 @@ def _combine(slopes: np.ndarray, owners: list[int], offsets: np.ndarray) -> Swee
     best = float(offsets[k] + refine_peak(strength[k - 1 : k + 2]) * (offsets[1] - offsets[0]))
     error = _standard_error(limited, owners, k, offsets)
     shown = (maximum_filter1d(limited, 3, axis=1) > 2.0).mean(axis=0)
-    return SweepResult(offsets, strength, best, error, float(strength[k] / np.median(strength)), len(set(owners)), shown)
+    return SweepResult(
+        offsets, strength, best, error, float(strength[k] / np.median(strength)), len(set(owners)), shown
+    )
 
 
 def _limited(strength: np.ndarray, most: float = 12.0) -> np.ndarray:

@@ -33,11 +33,15 @@ class Neighbourhood:
 def look_around(cloud: Cloud, options: IdentifyOptions) -> Neighbourhood:
     """Neighbour graph, smoothed normals and the noise across the surface."""
     if len(cloud) < 4 * options.neighbours:
-        raise StageError(f"cloud: points: {len(cloud)}: at least {4 * options.neighbours} are needed: check the crop of the cloud")
+        raise StageError(
+            f"cloud: points: {len(cloud)}: at least {4 * options.neighbours} are needed: check the crop of the cloud"
+        )
     distance, idx = cKDTree(cloud.points).query(cloud.points, k=options.neighbours, workers=-1)
     normals = _unit(cloud.normals[idx].sum(axis=1))
     residual = _local_residual(cloud.points, idx)
-    return Neighbourhood(idx.astype(np.int32), normals, residual, float(np.median(residual)), float(np.median(distance[:, 3])))
+    return Neighbourhood(
+        idx.astype(np.int32), normals, residual, float(np.median(residual)), float(np.median(distance[:, 3]))
+    )
 
 
 def _unit(v: np.ndarray) -> np.ndarray:
@@ -82,7 +86,9 @@ def find_planes(cloud: Cloud, around: Neighbourhood, options: IdentifyOptions) -
     inlier = max(options.inlier_sigmas * around.noise, options.inlier_floor * cloud.diameter)
     seeds = np.argsort(around.residual, kind="stable")
     labels, count = grow_planes(
-        cloud.points, around.normals, around.neighbour_idx, seeds, inlier, np.cos(np.radians(options.normal_degrees)), options.min_points
+        cloud.points, around.normals, around.neighbour_idx, seeds, inlier, np.cos(
+            np.radians(options.normal_degrees)
+        ), options.min_points
     )
     if not count:
         raise StageError("cloud: no plane found: kerfwright needs flat boards; check that the cloud shows the object")

@@ -39,7 +39,9 @@ class Raster:
     def counts(self, xy: np.ndarray) -> np.ndarray:
         """Points a cell, (rows, columns) float."""
         column, row = np.floor((xy - self.low) / self.cell).astype(int).T
-        return np.bincount(row * self.shape[1] + column, minlength=self.shape[0] * self.shape[1]).reshape(self.shape).astype(float)
+        return np.bincount(
+            row * self.shape[1] + column, minlength=self.shape[0] * self.shape[1]
+        ).reshape(self.shape).astype(float)
 
     def to_plane(self, row_column: np.ndarray) -> np.ndarray:
         """(N, 2) positions in cells (row, column; centres at whole numbers) to plane coordinates."""

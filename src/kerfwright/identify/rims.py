@@ -46,7 +46,9 @@ def outline_samples(piece: Polygon, spacing: float) -> tuple[np.ndarray, np.ndar
     for number, ring in enumerate([piece.exterior, *piece.interiors]):
         at = np.arange(0, ring.length, spacing)
         xy, ahead, behind = (
-            shapely.get_coordinates(shapely.line_interpolate_point(ring, (at + shift) % ring.length)) for shift in (0, 3 * spacing, -3 * spacing)
+            shapely.get_coordinates(
+                shapely.line_interpolate_point(ring, (at + shift) % ring.length)
+            ) for shift in (0, 3 * spacing, -3 * spacing)
         )
         tangent = ahead - behind
         turn = 1.0 if ring.is_ccw == (number == 0) else -1.0
@@ -58,7 +60,9 @@ def outline_samples(piece: Polygon, spacing: float) -> tuple[np.ndarray, np.ndar
 
 
 def cut_points(
-    frame: np.ndarray, samples: tuple[np.ndarray, np.ndarray, np.ndarray], cloud: Cloud, around: Neighbourhood, deepest: float, width: float
+    frame: np.ndarray, samples: tuple[
+        np.ndarray, np.ndarray, np.ndarray
+    ], cloud: Cloud, around: Neighbourhood, deepest: float, width: float
 ) -> CutPoints:
     """Points that face outward beside the outline, from a little above the sheet plane down to `deepest` below it.
 
@@ -98,7 +102,9 @@ def trace_rim(
     return Rim(moved, samples[1], samples[2], seen, error)
 
 
-def _window_medians(sample: np.ndarray, value: np.ndarray, size: int, window: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _window_medians(
+    sample: np.ndarray, value: np.ndarray, size: int, window: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Median, count and robust spread of values in a window of samples about each sample."""
     order = np.argsort(sample, kind="stable")
     sample, value = sample[order], value[order]

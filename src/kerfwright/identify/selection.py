@@ -62,7 +62,9 @@ def gather_evidence(cloud: Cloud, around: Neighbourhood, slabs: list[Slab], opti
     pairs = [_explains(slab, places, normals, tolerance) for slab in slabs]
     by_sheet, by_cut = (np.array(side).reshape(len(slabs), len(idx)) for side in zip(*pairs, strict=True))
     interior = tuple(_held_by(slab, slabs) for slab in slabs)
-    return Evidence(places, by_sheet, by_cut, np.array([_cost(s, by, options) for s, by in zip(slabs, by_sheet, strict=True)]), interior)
+    return Evidence(places, by_sheet, by_cut, np.array(
+        [_cost(s, by, options) for s, by in zip(slabs, by_sheet, strict=True)]
+    ), interior)
 
 
 def _even_samples(points: np.ndarray, voxel: float) -> np.ndarray:
@@ -95,7 +97,9 @@ def _held_by(slab: Slab, slabs: list[Slab], count: int = 800) -> np.ndarray:
     """(M, C) which candidates hold each interior sample of the slab."""
     step = np.sqrt(slab.region.area / (count / 4))
     low_x, low_y, high_x, high_y = slab.region.bounds
-    x, y = (g.ravel() for g in np.meshgrid(np.arange(low_x + step / 2, high_x, step), np.arange(low_y + step / 2, high_y, step)))
+    x, y = (g.ravel() for g in np.meshgrid(
+        np.arange(low_x + step / 2, high_x, step), np.arange(low_y + step / 2, high_y, step)
+    ))
     inside = shapely.contains_xy(slab.region, x, y)
     flat = np.stack([x, y], axis=1)[inside]
     heights = slab.thickness.value * np.array([0.125, 0.375, 0.625, 0.875])
@@ -156,7 +160,9 @@ def _cover_matrix(groups: list[np.ndarray], count: int) -> coo_array:
         columns += [c, np.arange(len(group)) + count + start]
         data += [-np.ones(len(s)), np.ones(len(group))]
         start += len(group)
-    return coo_array((np.concatenate(data), (np.concatenate(rows), np.concatenate(columns))), shape=(start, count + start))
+    return coo_array(
+        (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns))), shape=(start, count + start)
+    )
 
 
 def _conflicts(evidence: Evidence) -> list[list[int]]:

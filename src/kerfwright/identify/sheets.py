@@ -48,7 +48,9 @@ def _joined(a: Slab, b: Slab, others: list[Slab], reach: float) -> Slab | None:
     other_region = Polygon(moved[:, :2]).buffer(0)
     gap = a.region.distance(other_region)
     for crossing in others:
-        if abs(crossing.normal @ a.normal) > 0.9 or gap > 1.5 * crossing.thickness.value / _sine(crossing, a) + 2 * reach:
+        if abs(
+            crossing.normal @ a.normal
+        ) > 0.9 or gap > 1.5 * crossing.thickness.value / _sine(crossing, a) + 2 * reach:
             continue
         if not _stops_at(crossing, a, reach):
             continue
@@ -69,7 +71,9 @@ def _sine(a: Slab, b: Slab) -> float:
 def _stops_at(crossing: Slab, slab: Slab, reach: float) -> bool:
     """Whether the crossing board lies on one side of the slab only."""
     rings = np.asarray(crossing.region.exterior.coords)
-    z = np.concatenate([slab.to_board(crossing.to_world(np.c_[rings, np.full(len(rings), h)]))[:, 2] for h in (0.0, crossing.thickness.value)])
+    z = np.concatenate([slab.to_board(
+        crossing.to_world(np.c_[rings, np.full(len(rings), h)])
+    )[:, 2] for h in (0.0, crossing.thickness.value)])
     return min(z.max() - slab.thickness.value, -z.min()) < 1.5 * reach
 
 
@@ -102,7 +106,9 @@ def to_sheet(name: str, slab: Slab, cloud: Cloud, around: Neighbourhood, options
     rings = [rim.places[rim.ring == k] for k in range(int(rim.ring.max()) + 1)]
     region = _polygon(rings, slab.region)
     top, bottom, cut = _evidence(slab, region, cloud, around)
-    return Sheet(name, slab.world_from_board, _quantity(slab), slab.thickness.evidence != "inferred", region, top, bottom, cut)
+    return Sheet(
+        name, slab.world_from_board, _quantity(slab), slab.thickness.evidence != "inferred", region, top, bottom, cut
+    )
 
 
 def _polygon(rings: list[np.ndarray], rough: Polygon) -> Polygon:
@@ -117,7 +123,9 @@ def _quantity(slab: Slab) -> Quantity:
     return Quantity(value=slab.thickness.value, standard_error=slab.thickness.standard_error, origin=origin)
 
 
-def _evidence(slab: Slab, region: Polygon, cloud: Cloud, around: Neighbourhood) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _evidence(
+    slab: Slab, region: Polygon, cloud: Cloud, around: Neighbourhood
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Indices of cloud points on the top, the bottom and the cut faces."""
     tolerance = max(5 * around.noise, cloud.diameter / 500)
     x, thickness = slab.to_board(cloud.points), slab.thickness.value
@@ -127,5 +135,7 @@ def _evidence(slab: Slab, region: Polygon, cloud: Cloud, around: Neighbourhood) 
     top = near[(np.abs(z - thickness) < tolerance) & (nz > 0.8)]
     bottom = near[(np.abs(z) < tolerance) & (nz < -0.8)]
     side = near[np.abs(nz) < 0.6]
-    rim = shapely.distance(region.boundary, shapely.points(x[side, :2])) < 2 * tolerance if len(side) else np.zeros(0, bool)
+    rim = shapely.distance(
+        region.boundary, shapely.points(x[side, :2])
+    ) < 2 * tolerance if len(side) else np.zeros(0, bool)
     return top, bottom, side[rim]

@@ -75,7 +75,9 @@ def plane_frame(normal: np.ndarray, point: np.ndarray) -> np.ndarray:
 
 
 def candidate_slabs(
-    capture: Capture, around: Neighbourhood, planes: list[Primitive], free: FreeSpace, photos: Photos, options: IdentifyOptions
+    capture: Capture, around: Neighbourhood, planes: list[
+        Primitive
+    ], free: FreeSpace, photos: Photos, options: IdentifyOptions
 ) -> list[Slab]:
     """All candidates that are neither too thick for their region nor seen through, in the order of their planes."""
     scene = _Scene(capture, around, planes, free, options, photos)
@@ -113,7 +115,9 @@ def footprint(other: Slab, slab: Slab) -> Polygon:
     for corners in ends:
         ahead = np.roll(corners, -1, axis=0)
         for level in (low + 0.25 * (high - low), high - 0.25 * (high - low)):
-            share = (level - corners[:, 2]) / np.where(np.abs(ahead[:, 2] - corners[:, 2]) < 1e-9, np.nan, ahead[:, 2] - corners[:, 2])
+            share = (level - corners[:, 2]) / np.where(
+                np.abs(ahead[:, 2] - corners[:, 2]) < 1e-9, np.nan, ahead[:, 2] - corners[:, 2]
+            )
             cross = (share >= 0) & (share <= 1)
             points.append((corners + share[:, None] * (ahead - corners))[cross, :2])
     crossing = np.concatenate(points)
@@ -178,10 +182,14 @@ class _Scene:
 
     def coplanar(self, normal: np.ndarray, point: np.ndarray) -> tuple[int, ...]:
         """Primitives on the plane through `point` that face along `normal`."""
-        tolerance = 3 * max(self.options.inlier_sigmas * self.around.noise, self.options.inlier_floor * self.diameter) / 2
+        tolerance = 3 * max(
+            self.options.inlier_sigmas * self.around.noise, self.options.inlier_floor * self.diameter
+        ) / 2
         cos = np.cos(np.radians(self.options.opposite_degrees))
         return tuple(
-            k for k, p in enumerate(self.planes) if p.normal @ normal > cos and abs((p.centroid - point) @ normal) < tolerance
+            k for k, p in enumerate(self.planes) if p.normal @ normal > cos and abs(
+                (p.centroid - point) @ normal
+            ) < tolerance
         )
 
     def points(self, numbers: tuple[int, ...]) -> np.ndarray:
@@ -209,7 +217,9 @@ def _hypotheses(scene: _Scene, frame: np.ndarray, piece: Polygon) -> list[Thickn
     opposite = from_opposite(frame, piece, scene.planes, cloud.points, (low, high), scene.options.opposite_degrees)
     rim = trace_rim(frame, piece, cloud, around, scene.diameter / 40, spacing=scene.rim_spacing, width=scene.fringe)
     photos = from_photos(frame, rim, scene.photos, (low, high), step=scene.diameter * scene.options.sweep_step)
-    found = [sharpened(h, photos) for h in opposite] or [p for p in photos[:2] if p.support > max(3.3, 0.7 * photos[0].support)]
+    found = [sharpened(h, photos) for h in opposite] or [
+        p for p in photos[:2] if p.support > max(3.3, 0.7 * photos[0].support)
+    ]
     if not found and not scene.photos.views:
         found = from_cut_faces(frame, piece, cloud, around, (low, high))
     height = frame[2, 3]

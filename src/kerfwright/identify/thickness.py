@@ -109,7 +109,9 @@ def _cut_columns(
     return cut.depth, position[cut.sample], len(samples[0]) * around.spacing
 
 
-def _column_ends(depth: np.ndarray, along: np.ndarray, step: float, bin_length: float, latest_start: float) -> np.ndarray:
+def _column_ends(
+    depth: np.ndarray, along: np.ndarray, step: float, bin_length: float, latest_start: float
+) -> np.ndarray:
     """For each stretch of the outline: (stretch, depth of the first gap); stretches that start too deep say nothing."""
     stretch = np.floor(along / bin_length).astype(int)
     level = np.floor(depth / step).astype(int)
@@ -166,7 +168,9 @@ def from_photos(
     return _peaks(sweep, limits)
 
 
-def _looking_at(photos: Photos, places: np.ndarray, outward: np.ndarray, normal: np.ndarray, most_views: int) -> np.ndarray:
+def _looking_at(
+    photos: Photos, places: np.ndarray, outward: np.ndarray, normal: np.ndarray, most_views: int
+) -> np.ndarray:
     """(V, N) which views look at the cut face, neither grazing it nor along the sweep; the best views only."""
     visible = np.zeros((len(photos.views), len(places)), bool)
     for k, view in enumerate(photos.views):
@@ -199,7 +203,9 @@ def _peaks(sweep: SweepResult, limits: tuple[float, float]) -> list[ThicknessHyp
 
 def sharpened(coarse: ThicknessHypothesis, photos: list[ThicknessHypothesis]) -> ThicknessHypothesis:
     """The hypothesis with its value from the photographs, where they show an edge near it; an opposite face seen dimly is biased."""
-    near = [p for p in photos if abs(p.value - coarse.value) < 0.08 * coarse.value + 3 * coarse.standard_error and p.support > 2.5]
+    near = [p for p in photos if abs(
+        p.value - coarse.value
+    ) < 0.08 * coarse.value + 3 * coarse.standard_error and p.support > 2.5]
     if not near:
         return coarse
     best = min(near, key=lambda p: abs(p.value - coarse.value))

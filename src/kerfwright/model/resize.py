@@ -33,7 +33,9 @@ def resized_contact(contact: Contact, new_from_model: np.ndarray) -> Contact:
 
     return contact.model_copy(update={
         "point": move(contact.point), "normal": tuple(float(x) for x in rigid[:3, :3] @ np.asarray(contact.normal)),
-        "interface": tuple(tuple(move(p) for p in polygon) for polygon in contact.interface), "area": contact.area * scale**2,
+        "interface": tuple(
+            tuple(move(p) for p in polygon) for polygon in contact.interface
+        ), "area": contact.area * scale**2,
     })
 
 
@@ -62,4 +64,6 @@ def _path(path: CutPath, scale: float) -> CutPath:
 
 
 def _bevel(bevel: Bevel, scale: float) -> Bevel:
-    return bevel.model_copy(update={k: tuple(float(x) * scale for x in getattr(bevel, k)) for k in ("start", "end", "point")})
+    return bevel.model_copy(
+        update={k: tuple(float(x) * scale for x in getattr(bevel, k)) for k in ("start", "end", "point")}
+    )

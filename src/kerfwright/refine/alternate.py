@@ -18,7 +18,8 @@ from kerfwright.refine.types import Outline
 
 __all__ = ["refined_assembly"]
 
-EXACT = AssembleOptions(outline_error=1 / 200, reach=1 / 60)  # outlines from photographs are this much better than the cloud's
+# outlines from photographs are this much better than the cloud's
+EXACT = AssembleOptions(outline_error=1 / 200, reach=1 / 60)
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,9 @@ def refined_assembly(
 ) -> tuple[tuple[Outline, ...], Assembly]:
     """One outline a board and the assembly found with them."""
     diameter = capture.cloud.diameter
-    found = segment_boards(assembly.sheets, assembly.constraints, capture, SegmentOptions(use_images=options.use_images))
+    found = segment_boards(
+        assembly.sheets, assembly.constraints, capture, SegmentOptions(use_images=options.use_images)
+    )
     pieces = []
     for sheet, segments, board in zip(assembly.sheets, assembly.constraints, found, strict=True):
         for outline in board.outlines:

@@ -25,7 +25,9 @@ def outline_region(outline: Outline) -> Polygon:
     return _largest(Polygon(loops[0].points, [loop.points for loop in loops[1:]]).buffer(0))
 
 
-def constrained_region(region: Polygon, segments: tuple[ConstraintSegment, ...], reach: float, beyond: float) -> Polygon:
+def constrained_region(
+    region: Polygon, segments: tuple[ConstraintSegment, ...], reach: float, beyond: float
+) -> Polygon:
     """The region run on to each segment over its length (by at most `reach`) and cut off behind it (as far as `beyond`)."""
     for segment in segments:
         filled = shapely.union_all([region, *_filling(region, segment, reach)])
@@ -77,7 +79,9 @@ def _curtain(feet: np.ndarray, depth: np.ndarray, inward: np.ndarray) -> Polygon
     return Polygon(np.concatenate([feet, (feet + depth[:, None] * inward)[::-1]])).buffer(0)
 
 
-def to_loops(region: Polygon, outline: Outline, segments: tuple[ConstraintSegment, ...], step: float) -> tuple[BoundaryLoop, ...]:
+def to_loops(
+    region: Polygon, outline: Outline, segments: tuple[ConstraintSegment, ...], step: float
+) -> tuple[BoundaryLoop, ...]:
     """Boundary loops of a region at even spacing; errors from the outline it came from, small on constraint segments."""
     known = np.concatenate([loop.points for loop in outline.loops])
     error = np.concatenate([loop.standard_error for loop in outline.loops])

@@ -30,7 +30,9 @@ def finished(outlines: tuple[Outline, ...], assembly: Assembly, capture: Capture
     for number, outline in enumerate(outlines):
         board, notes = _board(number, outline, assembly, capture.cloud.diameter, options)
         boards.append(board)
-        findings += [Finding(code="K010", severity="warning", message=f"{board.name}: {note}", boards=(board.name,)) for note in notes]
+        findings += [Finding(
+            code="K010", severity="warning", message=f"{board.name}: {note}", boards=(board.name,)
+        ) for note in notes]
     return Refined(tuple(boards), assembly.contacts, (*assembly.findings, *findings))
 
 
@@ -54,7 +56,9 @@ def _cut_path(
         return polygon_path(region, tolerance), (f"the cut path is a plain polygon: {error}",)
     short = [e for loop in (fit.path.outer, *fit.path.holes) for e in loop.edges if edge_length(e) < SHORTEST]
     if short:
-        return polygon_path(region, tolerance), (f"the cut path is a plain polygon: {len(short)} fitted edges have no length",)
+        return polygon_path(region, tolerance), (
+            f"the cut path is a plain polygon: {len(short)} fitted edges have no length",
+        )
     return fit.path, fit.notes
 
 
