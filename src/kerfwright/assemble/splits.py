@@ -21,6 +21,7 @@ from kerfwright.model import Contact, ContactEvidence
 __all__ = ["SeamLine", "find_seam_lines", "seam_contact", "seam_segments", "split_sheet"]
 
 LEAST_STRENGTH = 3.5  # of a seam, in units of the face's own texture
+CLEAR_STRENGTH = 5.0  # of the best seam of a board: one clear seam lends its weaker neighbours credit
 LEAST_PERSISTENCE = 0.6  # share of all stretches in all views that show it
 LEAST_VIEWS = 4
 MOST_VIEWS = 6
@@ -50,7 +51,7 @@ def find_seam_lines(
         for m in (first, np.array([-first[1], first[0]])) for face in ("top", "bottom")
     ]
     best = max(found, key=lambda seams: max((s.strength for s in seams), default=0.0))
-    return sorted(best, key=lambda s: s.offset)
+    return sorted(best, key=lambda s: s.offset) if any(s.strength > CLEAR_STRENGTH for s in best) else []
 
 
 def _seams_across(
