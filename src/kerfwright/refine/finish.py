@@ -17,11 +17,12 @@ from kerfwright.refine.boards import to_board
 from kerfwright.refine.constrain import constrained_region, to_loops
 from kerfwright.refine.curves import fit_curves
 from kerfwright.refine.options import Refined, RefineOptions
-from kerfwright.refine.types import BoundaryLoop, Outline
+from kerfwright.refine.types import Outline
 
 __all__ = ["finished"]
 
 SHORTEST = 1e-3  # mm; OCCT makes no edge of less
+SMOOTHED = "spurs of the boundary were left out: it was too rough to fit as traced"
 
 
 def finished(outlines: tuple[Outline, ...], assembly: Assembly, capture: Capture, options: RefineOptions) -> Refined:
@@ -30,9 +31,10 @@ def finished(outlines: tuple[Outline, ...], assembly: Assembly, capture: Capture
     for number, outline in enumerate(outlines):
         board, notes = _board(number, outline, assembly, capture.cloud.diameter, options)
         boards.append(board)
-        findings += [Finding(
-            code="K010", severity="warning", message=f"{board.name}: {note}", boards=(board.name,)
-        ) for note in notes]
+        findings += [
+            Finding(code="K010", severity="warning", message=f"{board.name}: {note}", boards=(board.name,))
+            for note in notes
+        ]
     return Refined(tuple(boards), assembly.contacts, (*assembly.findings, *findings))
 
 
@@ -41,30 +43,42 @@ def _board(
 ) -> tuple[Board, tuple[str, ...]]:
     sheet, segments = assembly.sheets[number], assembly.constraints[number]
     region = constrained_region(sheet.region, segments, diameter / 6, diameter / 20)
-    loops = to_loops(region, outline, segments, options.boundary_step * diameter)
-    path, notes = _cut_path(loops, region, segments, options.boundary_step * diameter)
-    return to_board(sheet, path, segments, outline.origin, notes), notes
+    step = options.boundary_step * diameter
+    attempts = [(region, ()), (_smoothed(region, segments, diameter), (SMOOTHED,))]
+    problem = ""
+    for shape, remarks in attempts:
+        try:
+            fit = fit_curves(to_loops(shape, outline, segments, step), segments)
+            _refuse_short_edges(fit.path)
+        except StageError as error:
+            problem = str(error)
+            continue
+        notes = (*fit.notes, *remarks)
+        return to_board(sheet, fit.path, segments, outline.origin, notes), notes
+    notes = (f"the cut path is a plain polygon: {problem}",)
+    return to_board(sheet, polygon_path(region, step), segments, outline.origin, notes), notes
 
 
-def _cut_path(
-    loops: tuple[BoundaryLoop, ...], region: Polygon, segments: tuple[ConstraintSegment, ...], tolerance: float
-) -> tuple[CutPath, tuple[str, ...]]:
-    """The fitted cut path; a polygon, and a note that says so, for a boundary too rough to fit."""
-    try:
-        fit = fit_curves(loops, segments)
-    except StageError as error:
-        return polygon_path(region, tolerance), (f"the cut path is a plain polygon: {error}",)
-    short = [e for loop in (fit.path.outer, *fit.path.holes) for e in loop.edges if edge_length(e) < SHORTEST]
+def _smoothed(region: Polygon, segments: tuple[ConstraintSegment, ...], diameter: float) -> Polygon:
+    """The region without spurs and notches that are narrower than any cut; its corners stay."""
+    reach = diameter / 150
+    smooth = region
+    for step in (-reach, 2 * reach, -reach):
+        smooth = smooth.buffer(step, join_style="mitre")
+    smooth = max(getattr(smooth, "geoms", [smooth]), key=lambda p: p.area)
+    return constrained_region(smooth, segments, diameter / 6, diameter / 20)
+
+
+def _refuse_short_edges(path: CutPath) -> None:
+    """Raise StageError when a fitted edge has no length."""
+    short = [e for loop in (path.outer, *path.holes) for e in loop.edges if edge_length(e) < SHORTEST]
     if short:
-        return polygon_path(region, tolerance), (
-            f"the cut path is a plain polygon: {len(short)} fitted edges have no length",
-        )
-    return fit.path, fit.notes
+        raise StageError(f"cut path: edges: {len(short)} have no length: the boundary is too rough there")
 
 
 def polygon_path(region: Polygon, tolerance: float) -> CutPath:
     """A polygon's rings as lines, simplified to a tolerance in mm."""
-    plain = orient(shapely.set_precision(region.simplify(tolerance), 10 * SHORTEST).buffer(0))
+    plain = orient(shapely.set_precision(region.simplify(tolerance), SHORTEST).buffer(0))
     plain = max(getattr(plain, "geoms", [plain]), key=lambda p: p.area)
     loops = []
     for ring in (plain.exterior, *plain.interiors):
