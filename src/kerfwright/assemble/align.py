@@ -1,8 +1,8 @@
 """Global alignment: boards that are nearly parallel or square become exactly so (paper, Global Alignment).
 
-Boards share directions: one unit vector a class of parallel boards, square to other classes where the data allow it. Every board keeps
-its own offset, taken at its own points, so that nothing drifts. A board's angle is known no better than its noise over its shorter
-side allows; boards that are tilted by more than that stay tilted.
+Boards share directions: one unit vector a class of parallel boards, square to other classes where the data allow it.
+Every board keeps its own offset, taken at its own points, so that nothing drifts. A board's angle is known no better
+than its noise over its shorter side allows; boards that are tilted by more than that stay tilted.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ __all__ = ["PlaneEvidence", "align_sheets"]
 
 @dataclass(frozen=True, eq=False)
 class PlaneEvidence:
-    """What the cloud says of a board's top plane: normal, centroid, scatter about it, noise and angular standard error (radians)."""
+    """What the cloud says of a board's top plane: normal, centroid, scatter about it, noise and angular standard error
+    (radians).
+    """
 
     normal: np.ndarray  # (3,)
     centre: np.ndarray  # (3,) on the top sheet plane
@@ -32,7 +34,8 @@ class PlaneEvidence:
     weight: float  # effective number of independent points
 
 
-# The ground acts as a board: level and upright boards are square to it. It is known to half a degree, and gives way to level boards.
+# The ground acts as a board: level and upright boards are square to it. It is known to half a degree, and gives way to
+# level boards.
 UPRIGHT = PlaneEvidence(np.array([0.0, 0, 1]), np.zeros(3), np.diag([1.0, 1.0, 0.0]), 1.0, float(np.radians(0.5)), 1e-3)
 
 
@@ -167,7 +170,9 @@ def _moved(sheet: Sheet, evidence: PlaneEvidence, direction: np.ndarray, cloud: 
 
 
 def _offset(sheet: Sheet, evidence: PlaneEvidence, normal: np.ndarray, cloud: Cloud) -> float:
-    """Offset of the top sheet plane along the normal: the side with the lesser noise decides, the other where it is alone."""
+    """Offset of the top sheet plane along the normal: the side with the lesser noise decides, the other where it is
+    alone.
+    """
     found = []
     for idx, sign in ((sheet.top_idx, 0.0), (sheet.bottom_idx, 1.0)):
         if len(idx) >= 30:

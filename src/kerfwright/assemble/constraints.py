@@ -36,7 +36,8 @@ def constraint_segments(
 
 
 def _pointed(sheets: tuple[Sheet, ...], decided: list[Decided]) -> list[Trace]:
-    """The contacts' traces; where two slanted planes end a board in a point, both are moved to the line of the point."""
+    """The contacts' traces; where two slanted planes end a board in a point, both are moved to the line of the point.
+    """
     traces = [d.joint.trace for d in decided]
     for i, one in enumerate(decided):
         for j in range(i + 1, len(decided)):
@@ -59,7 +60,8 @@ def _segments(
     return [
         ConstraintSegment(
             start=trace.place(np.zeros(1), np.array([high]))[0], end=trace.place(np.zeros(1), np.array([low]))[0],
-            origin=origin, standard_error=PLANE_ERROR, normal=trace.normal if slanted else None, depth=trace.depth, contact=contact,
+            origin=origin, standard_error=PLANE_ERROR, normal=trace.normal if slanted else None, depth=trace.depth,
+            contact=contact,
         )
         for low, high in intervals
     ]

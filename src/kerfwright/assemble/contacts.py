@@ -116,9 +116,8 @@ def _end_is_seen(scene: _Scene, joint: Joint) -> bool:
 
 def _unfinished(scene: _Scene, joint: Joint | None) -> Joint | None:
     """A far joint whose board just fades out: no cut face ends it, and nobody saw through the gap."""
-    if joint is None or joint.gap > scene.mm(
-        scene.options.unseen_reach
-    ) or joint.length < scene.mm(scene.options.reach):
+    options = scene.options
+    if joint is None or joint.gap > scene.mm(options.unseen_reach) or joint.length < scene.mm(options.reach):
         return None
     if _end_is_seen(scene, joint) or _gap_is_free(scene, joint):
         return None
@@ -138,7 +137,8 @@ def _gap_is_free(scene: _Scene, joint: Joint) -> bool:
 def _is_contact(scene: _Scene, joint: Joint, reverse: Joint | None) -> bool:
     """A near joint counts when it is long enough and, where photographs show its line, they show an edge there.
 
-    A board whose outline covers the other's thickness stops there only if its outer face shows a seam, or the other may stop instead.
+    A board whose outline covers the other's thickness stops there only if its outer face shows a seam, or the other may
+    stop instead.
     """
     if joint.length < scene.mm(scene.options.reach) or _end_is_seen(scene, joint):
         return False
@@ -156,9 +156,9 @@ def _seam(scene: _Scene, joint: Joint, face: str) -> Seam:
 
 def _confirmed(scene: _Scene, joint: Joint | None) -> Decided | None:
     """A far joint that the photographs confirm: the first strong edge beyond the outline is at the plane."""
-    if joint is None or joint.length < scene.mm(
-        scene.options.reach
-    ) or _end_is_seen(scene, joint) or _gap_is_free(scene, joint):
+    if joint is None or joint.length < scene.mm(scene.options.reach):
+        return None
+    if _end_is_seen(scene, joint) or _gap_is_free(scene, joint):
         return None
     end = look_for_end(scene.sheets, joint, scene.photos, scene.obstacles, scene.mm(1 / 300))
     if end is None or end.views < 3 or end.score < scene.options.end_score:
@@ -212,9 +212,8 @@ def _swapped(e: ContactEvidence) -> ContactEvidence:
 
 def _alike(scene: _Scene, one: Joint, other: Joint) -> int:
     """1 when the boards of two joints have the same sizes in the same roles."""
-    return int(_same_size(
-        scene.sheets[one.a], scene.sheets[other.a]
-    ) and _same_size(scene.sheets[one.b], scene.sheets[other.b]))
+    sheets = scene.sheets
+    return int(_same_size(sheets[one.a], sheets[other.a]) and _same_size(sheets[one.b], sheets[other.b]))
 
 
 def _same_size(a: Sheet, b: Sheet) -> bool:
@@ -239,9 +238,8 @@ def to_contact(decided: Decided, sheets: tuple[Sheet, ...]) -> Contact:
     angle = float(np.degrees(np.arcsin(min(joint.trace.sine, 1.0))))
     return Contact(
         type=decided.kind, a=a.name, b=b.name, face_a=joint.face_a, face_b="edge",
-        point=_point(
-            normal * offset
-        ), normal=_point(normal), interface=polygons, area=joint.length * width, angle=angle,
+        point=_point(normal * offset), normal=_point(normal), interface=polygons,
+        area=joint.length * width, angle=angle,
         bevelled=abs(joint.trace.slope) > 1e-3, evidence=decided.evidence,
     )
 

@@ -1,7 +1,7 @@
 """Where a board ends on another's sheet plane (paper, Connections; supplement, Inferring Connection Types).
 
-A board b ends on a sheet plane of a when, column by column along the line in which that plane cuts b, the board starts within reach of the
-plane on its outer side and does not go on behind a. Columns are counted only where a has wood.
+A board b ends on a sheet plane of a when, column by column along the line in which that plane cuts b, the board starts
+within reach of the plane on its outer side and does not go on behind a. Columns are counted only where a has wood.
 """
 
 from __future__ import annotations
@@ -19,9 +19,11 @@ __all__ = ["Joint", "Search", "Trace", "columns", "end_on", "face_plane", "runs_
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """The line in which a plane cuts a board, in the board's plane: m.xy = offset, wood where m.xy > offset, tangent along it.
+    """The line in which a plane cuts a board, in the board's plane: m.xy = offset, wood where m.xy > offset, tangent
+    along it.
 
-    For a slanted plane it is the line at the height where the board reaches furthest; `slope` is how far it moves a mm of height.
+    For a slanted plane it is the line at the height where the board reaches furthest; `slope` is how far it moves a mm
+    of height.
     """
 
     m: np.ndarray  # (2,)
@@ -42,7 +44,9 @@ class Trace:
 
 
 def trace_of(board: Sheet, normal: np.ndarray, offset: float) -> Trace | None:
-    """Trace of the world plane normal.x = offset in a board that lies where normal.x > offset; None when nearly parallel."""
+    """Trace of the world plane normal.x = offset in a board that lies where normal.x > offset; None when nearly
+    parallel.
+    """
     n = normal @ board.world_from_board[:3, :3]
     d = offset - normal @ board.world_from_board[:3, 3]
     flat = float(np.hypot(n[0], n[1]))
@@ -74,8 +78,9 @@ class Joint:
 
 @dataclass(frozen=True)
 class Search:
-    """Where a joint is looked for, mm: how far b's outline may be from the plane, how wrong outlines are, how far beyond its outline
-    a may have wood, the width of a column, and the shortest interface."""
+    """Where a joint is looked for, mm: how far b's outline may be from the plane, how wrong outlines are, how far
+    beyond its outline a may have wood, the width of a column, and the shortest interface.
+    """
 
     reach: float
     slack: float
@@ -161,6 +166,5 @@ def runs_of(
     breaks = np.flatnonzero(np.diff(places) > max(joining, 1.5 * step))
     starts = np.r_[places[0], places[breaks + 1]]
     stops = np.r_[places[breaks], places[-1]]
-    return tuple((
-        float(a - step / 2), float(b + step / 2)
-    ) for a, b in zip(starts, stops, strict=True) if b - a + step >= shortest)
+    runs = zip(starts, stops, strict=True)
+    return tuple((float(a - step / 2), float(b + step / 2)) for a, b in runs if b - a + step >= shortest)

@@ -1,7 +1,7 @@
 """Seams in the photographs: is there an edge where two boards would meet? (paper, Disambiguating Corners)
 
-The paper compares an average gradient along the seam and a coarse difference of colour. Both are in the sweep of `photo_edges`: the step of
-the mean colours where the seam should be, against what is found beside it.
+The paper compares an average gradient along the seam and a coarse difference of colour. Both are in the sweep of
+`photo_edges`: the step of the mean colours where the seam should be, against what is found beside it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ class Seam:
 def look_for_seam(
     sheets: tuple[Sheet, ...], joint: Joint, face: str, photos: Photos, obstacles: Obstacles, window: float
 ) -> Seam:
-    """Score of the line on a sheet face of b in which the joint's plane cuts it. window: mm that the line may be off."""
+    """Score of the line on a sheet face of b in which the joint's plane cuts it. window: mm that the line may be off.
+    """
     sweep = _sweep(sheets[joint.b], joint, face, photos, obstacles, -8 * window, 8 * window)
     if sweep is None:
         return Seam(UNSEEN_SCORE, 0)
@@ -46,7 +47,8 @@ def look_for_seam(
 def look_for_end(
     sheets: tuple[Sheet, ...], joint: Joint, photos: Photos, obstacles: Obstacles, window: float
 ) -> Seam | None:
-    """Whether b, whose outline stops short of a, is seen to run on up to it: the strongest edge from there on is at the plane itself.
+    """Whether b, whose outline stops short of a, is seen to run on up to it: the strongest edge from there on is at the
+    plane itself.
 
     None when no photograph shows the place.
     """
@@ -61,7 +63,8 @@ def look_for_end(
 
 
 def _sweep(
-    board: Sheet, joint: Joint, face: str, photos: Photos, obstacles: Obstacles, low: float, high: float, step: float | None = None
+    board: Sheet, joint: Joint, face: str, photos: Photos, obstacles: Obstacles, low: float, high: float,
+    step: float | None = None,
 ) -> SweepResult | None:
     height = board.thickness.value if face == "top" else 0.0
     step = step or (high - low) / 160

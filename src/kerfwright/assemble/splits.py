@@ -1,7 +1,9 @@
-"""Boards glued edge to edge: seams that run right across a region seen as one board (method.md; a limit the paper names).
+"""Boards glued edge to edge: seams that run right across a region seen as one board (method.md; a limit the paper
+names).
 
-A seam is a straight line across the whole board at which the colours step, in every stretch of it and in every view. Grain wanders, knots
-and shadows are short, and an edge where another board stands on this one is already known. Precision before recall.
+A seam is a straight line across the whole board at which the colours step, in every stretch of it and in every view.
+Grain wanders, knots and shadows are short, and an edge where another board stands on this one is already known.
+Precision before recall.
 """
 
 from __future__ import annotations
@@ -85,13 +87,13 @@ def _seams_across(
     known = _known_lines(sheet, m, touching)
     ends = [along.min(), along.max()]
     return [
-        SeamLine(m, float(offsets[k]), offsets[k] * m + ends[0] * tangent, offsets[k] * m + ends[1] * tangent, float(
-            strength[k]
-        ), sweep.views)
+        SeamLine(
+            m, float(offsets[k]), offsets[k] * m + ends[0] * tangent, offsets[k] * m + ends[1] * tangent,
+            float(strength[k]), sweep.views,
+        )
         for k in _peaks(strength, sweep.persistence, reach=round(margin / (offsets[1] - offsets[0])))
-        if all(
-            abs(offsets[k] - other) > margin / 2 for other in known
-        ) and _crosses_all(sheet.region, m, offsets[k], margin / 4)
+        if all(abs(offsets[k] - other) > margin / 2 for other in known)
+        and _crosses_all(sheet.region, m, offsets[k], margin / 4)
     ]
 
 
@@ -117,7 +119,9 @@ def _known_lines(sheet: Sheet, m: np.ndarray, touching: list[Sheet]) -> list[flo
 
 
 def _crosses_all(region: Polygon, m: np.ndarray, offset: float, reach: float) -> bool:
-    """Whether the line, and lines a little before and after it, run through one stretch of wood: not past a hole or a bay."""
+    """Whether the line, and lines a little before and after it, run through one stretch of wood: not past a hole or a
+    bay.
+    """
     tangent = np.array([-m[1], m[0]])
     for shift in (-reach, 0.0, reach):
         middle = (offset + shift) * m
@@ -165,9 +169,8 @@ def seam_contact(before: Sheet, after: Sheet, seam: SeamLine) -> Contact:
     places = before.to_world(np.array(corners))
     normal = before.world_from_board[:3, :2] @ seam.m
     return Contact(
-        type=4, a=before.name, b=after.name, face_a="edge", face_b="edge", point=_point(
-            places[0]
-        ), normal=_point(normal),
+        type=4, a=before.name, b=after.name, face_a="edge", face_b="edge",
+        point=_point(places[0]), normal=_point(normal),
         interface=(tuple(_point(p) for p in places),), area=float(np.linalg.norm(seam.end - seam.start) * t), angle=0.0,
         evidence=ContactEvidence(seam_score=seam.strength, views=seam.views, decided_by="seam"),
     )

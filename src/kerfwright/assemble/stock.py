@@ -1,4 +1,6 @@
-"""One thickness for all boards of one stock: clustered by uncertainty (paper, Thickness Regularization; method.md trap 13)."""
+"""One thickness for all boards of one stock: clustered by uncertainty (paper, Thickness Regularization; method.md trap
+13).
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,8 @@ __all__ = ["share_thickness"]
 
 
 def share_thickness(sheets: tuple[Sheet, ...], diameter: float, options: AssembleOptions) -> tuple[Sheet, ...]:
-    """Sheets whose thicknesses agree within their uncertainty get their weighted mean; unseen ones take the commonest nearby.
+    """Sheets whose thicknesses agree within their uncertainty get their weighted mean; unseen ones take the commonest
+    nearby.
 
     The top sheet plane stays where it is: it was measured, the bottom follows.
     """

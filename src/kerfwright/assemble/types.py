@@ -17,8 +17,8 @@ __all__ = ["Assembly", "ConstraintSegment"]
 class ConstraintSegment:
     """A straight stretch that a board's cut path must follow and not cross (paper, Interface surfaces & constraints).
 
-    Board frame, mm. The material lies on the left of start -> end; the half-plane on the right is excluded for points that
-    project between start and end.
+    Board frame, mm. The material lies on the left of start -> end; the half-plane on the right is excluded for points
+    that project between start and end.
     """
 
     start: np.ndarray  # (2,)

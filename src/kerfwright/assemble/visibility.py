@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -62,7 +63,7 @@ def _slab(piece: Polygon, low: float, high: float) -> np.ndarray:
     corners = [np.c_[c, np.full(3, z)] for c in caps for z in (low, high)]
     for ring in (piece.exterior, *piece.interiors):
         xy = np.asarray(ring.coords)[:, :2]
-        for a, b in zip(xy[:-1], xy[1:], strict=True):
+        for a, b in pairwise(xy):
             quad = np.array([[*a, low], [*b, low], [*b, high], [*a, high]])
             corners += [quad[[0, 1, 2]], quad[[0, 2, 3]]]
     return np.concatenate(corners)

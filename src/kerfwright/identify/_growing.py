@@ -41,11 +41,12 @@ def _grow_one(seed, number, points, normals, neighbours, labels, queue, inlier, 
             offset = normal @ mean
             next_fit = int(next_fit * 1.5) + 1
         for other in neighbours[here]:
-            if labels[other] < 0 and normals[other] @ normal > cos_angle:
-                if abs(normal @ (points[other] - origin) - offset) < inlier:
-                    labels[other] = number
-                    queue[tail] = other
-                    tail += 1
+            if labels[other] >= 0 or normals[other] @ normal <= cos_angle:
+                continue
+            if abs(normal @ (points[other] - origin) - offset) < inlier:
+                labels[other] = number
+                queue[tail] = other
+                tail += 1
     return tail
 
 

@@ -1,7 +1,7 @@
 """What the cameras saw through: places in front of a visible surface hold no wood.
 
-A depth map a view is drawn from the cloud. A place is free in a view when every pixel about its
-projection shows a surface clearly behind it. Nothing drawn means nothing known: the cloud has holes, and floors are cropped away.
+A depth map a view is drawn from the cloud. A place is free in a view when every pixel about its projection shows a
+surface clearly behind it. Nothing drawn means nothing known: the cloud has holes, and floors are cropped away.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Where an edge lies, measured in the photographs.
 
-A straight or curved edge that is roughly known in space is swept along a direction; in every photograph that shows it, colours are read
-along the sweep. Colours averaged along the edge step where the edge is, in all views at the same offset, because the edge itself is a
-curve in space: what lies beside it does not matter. Wood grain, noise and the background do not agree in this way.
+A straight or curved edge that is roughly known in space is swept along a direction; in every photograph that shows it,
+colours are read along the sweep. Colours averaged along the edge step where the edge is, in all views at the same
+offset, because the edge itself is a curve in space: what lies beside it does not matter. Wood grain, noise and the
+background do not agree in this way.
 """
 
 from __future__ import annotations
@@ -69,9 +70,9 @@ def sweep_edge(
 ) -> SweepResult | None:
     """Sweep an edge through space and find where the photographs show it.
 
-    places (N, 3) world mm, neighbours in order along the edge; direction (3,) or (N, 3) unit; offsets (T,) mm, evenly spaced;
-    visible (V, N) bool: which view shows which place. smoothing: mm of the step detector. chunk: places averaged before the step
-    is measured. None when no view shows a whole chunk.
+    places (N, 3) world mm, neighbours in order along the edge; direction (3,) or (N, 3) unit; offsets (T,) mm, evenly
+    spaced; visible (V, N) bool: which view shows which place. smoothing: mm of the step detector. chunk: places
+    averaged before the step is measured. None when no view shows a whole chunk.
     """
     direction = np.broadcast_to(direction, places.shape)
     grid = places[:, None, :] + offsets[None, :, None] * direction[:, None, :]

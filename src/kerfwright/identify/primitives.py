@@ -1,7 +1,7 @@
 """Planes in an oriented cloud, by region growing over its neighbour graph and robust refits.
 
-The paper uses Efficient RANSAC (Primitive Detection and Adjacency). Growing from the flattest neighbourhoods finds the same
-connected plane patches in one deterministic pass: see docs/method.md.
+The paper uses Efficient RANSAC (Primitive Detection and Adjacency). Growing from the flattest neighbourhoods finds the
+same connected plane patches in one deterministic pass: see docs/method.md.
 """
 
 from __future__ import annotations
@@ -86,9 +86,8 @@ def find_planes(cloud: Cloud, around: Neighbourhood, options: IdentifyOptions) -
     inlier = max(options.inlier_sigmas * around.noise, options.inlier_floor * cloud.diameter)
     seeds = np.argsort(around.residual, kind="stable")
     labels, count = grow_planes(
-        cloud.points, around.normals, around.neighbour_idx, seeds, inlier, np.cos(
-            np.radians(options.normal_degrees)
-        ), options.min_points
+        cloud.points, around.normals, around.neighbour_idx, seeds, inlier, np.cos(np.radians(options.normal_degrees)),
+        options.min_points,
     )
     if not count:
         raise StageError("cloud: no plane found: kerfwright needs flat boards; check that the cloud shows the object")

@@ -1,7 +1,8 @@
 """Cut regions: from points on a plane to polygons with holes (paper, Cut Region Approximation).
 
-The paper thresholds a sum of Gaussians at a fixed value, which depends on how densely the stereo program sampled the face. Here the
-density is compared with the density round about, so that a face seen well on one side and badly on the other keeps both.
+The paper thresholds a sum of Gaussians at a fixed value, which depends on how densely the stereo program sampled the
+face. Here the density is compared with the density round about, so that a face seen well on one side and badly on the
+other keeps both.
 """
 
 from __future__ import annotations
@@ -39,9 +40,8 @@ class Raster:
     def counts(self, xy: np.ndarray) -> np.ndarray:
         """Points a cell, (rows, columns) float."""
         column, row = np.floor((xy - self.low) / self.cell).astype(int).T
-        return np.bincount(
-            row * self.shape[1] + column, minlength=self.shape[0] * self.shape[1]
-        ).reshape(self.shape).astype(float)
+        rows, columns = self.shape
+        return np.bincount(row * columns + column, minlength=rows * columns).reshape(self.shape).astype(float)
 
     def to_plane(self, row_column: np.ndarray) -> np.ndarray:
         """(N, 2) positions in cells (row, column; centres at whole numbers) to plane coordinates."""
@@ -51,7 +51,8 @@ class Raster:
 def occupancy(raster: Raster, xy: np.ndarray, spacing: float) -> np.ndarray:
     """Where (N, 2) points lie densely, (rows, columns) bool.
 
-    spacing: mm between points of a face seen well. Stereo spans dark openings with a thin veil of points: that is not wood.
+    spacing: mm between points of a face seen well. Stereo spans dark openings with a thin veil of points: that is not
+    wood.
     """
     density = gaussian_filter(raster.counts(xy), 1.0)
     some = (density > 1e-3).astype(float)

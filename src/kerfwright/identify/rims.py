@@ -1,7 +1,7 @@
 """The rim of a region: its outline moved onto the cut faces that the cloud shows.
 
-The outline of the points on a sheet plane is a few millimetres off, for stereo widens silhouettes. Points on the cut faces lie on the true
-boundary; seen along the sheet normal they are samples of the cut path.
+The outline of the points on a sheet plane is a few millimetres off, for stereo widens silhouettes. Points on the cut
+faces lie on the true boundary; seen along the sheet normal they are samples of the cut path.
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ class Rim:
 
 @dataclass(frozen=True, eq=False)
 class CutPoints:
-    """Cloud points on the cut faces of a slab: index, nearest rim sample, offset beyond it along its normal, depth below the top."""
+    """Cloud points on the cut faces of a slab: index, nearest rim sample, offset beyond it along its normal, depth
+    below the top.
+    """
 
     idx: np.ndarray
     sample: np.ndarray
@@ -46,9 +48,8 @@ def outline_samples(piece: Polygon, spacing: float) -> tuple[np.ndarray, np.ndar
     for number, ring in enumerate([piece.exterior, *piece.interiors]):
         at = np.arange(0, ring.length, spacing)
         xy, ahead, behind = (
-            shapely.get_coordinates(
-                shapely.line_interpolate_point(ring, (at + shift) % ring.length)
-            ) for shift in (0, 3 * spacing, -3 * spacing)
+            shapely.get_coordinates(shapely.line_interpolate_point(ring, (at + shift) % ring.length))
+            for shift in (0, 3 * spacing, -3 * spacing)
         )
         tangent = ahead - behind
         turn = 1.0 if ring.is_ccw == (number == 0) else -1.0
@@ -60,9 +61,8 @@ def outline_samples(piece: Polygon, spacing: float) -> tuple[np.ndarray, np.ndar
 
 
 def cut_points(
-    frame: np.ndarray, samples: tuple[
-        np.ndarray, np.ndarray, np.ndarray
-    ], cloud: Cloud, around: Neighbourhood, deepest: float, width: float
+    frame: np.ndarray, samples: tuple[np.ndarray, np.ndarray, np.ndarray], cloud: Cloud, around: Neighbourhood,
+    deepest: float, width: float,
 ) -> CutPoints:
     """Points that face outward beside the outline, from a little above the sheet plane down to `deepest` below it.
 
@@ -85,7 +85,8 @@ def cut_points(
 
 
 def trace_rim(
-    frame: np.ndarray, piece: Polygon, cloud: Cloud, around: Neighbourhood, depth: float, *, spacing: float, width: float
+    frame: np.ndarray, piece: Polygon, cloud: Cloud, around: Neighbourhood, depth: float, *,
+    spacing: float, width: float,
 ) -> Rim:
     """The outline with every stretch that has cut-face points moved onto their median.
 

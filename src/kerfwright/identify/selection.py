@@ -1,9 +1,9 @@
 """Which candidates are the boards: an exact 0-1 program (paper, Part Selection, where it is simulated annealing).
 
-Maximise the share of the observed surface that the chosen boards explain, less a cost a board, so that no board shares more than half
-of its volume with the union of the others. A place explained by a sheet plane counts fully, one explained by a cut face a little less:
-of two ways to cut the same block out of sheet stock the thinner stock wins. The union rule is added as cuts where a solution breaks
-it; pairwise constraints alone are not the same.
+Maximise the share of the observed surface that the chosen boards explain, less a cost a board, so that no board shares
+more than half of its volume with the union of the others. A place explained by a sheet plane counts fully, one
+explained by a cut face a little less: of two ways to cut the same block out of sheet stock the thinner stock wins. The
+union rule is added as cuts where a solution breaks it; pairwise constraints alone are not the same.
 """
 
 from __future__ import annotations
@@ -62,9 +62,8 @@ def gather_evidence(cloud: Cloud, around: Neighbourhood, slabs: list[Slab], opti
     pairs = [_explains(slab, places, normals, tolerance) for slab in slabs]
     by_sheet, by_cut = (np.array(side).reshape(len(slabs), len(idx)) for side in zip(*pairs, strict=True))
     interior = tuple(_held_by(slab, slabs) for slab in slabs)
-    return Evidence(places, by_sheet, by_cut, np.array(
-        [_cost(s, by, options) for s, by in zip(slabs, by_sheet, strict=True)]
-    ), interior)
+    cost = np.array([_cost(slab, own, options) for slab, own in zip(slabs, by_sheet, strict=True)])
+    return Evidence(places, by_sheet, by_cut, cost, interior)
 
 
 def _even_samples(points: np.ndarray, voxel: float) -> np.ndarray:
@@ -97,9 +96,8 @@ def _held_by(slab: Slab, slabs: list[Slab], count: int = 800) -> np.ndarray:
     """(M, C) which candidates hold each interior sample of the slab."""
     step = np.sqrt(slab.region.area / (count / 4))
     low_x, low_y, high_x, high_y = slab.region.bounds
-    x, y = (g.ravel() for g in np.meshgrid(
-        np.arange(low_x + step / 2, high_x, step), np.arange(low_y + step / 2, high_y, step)
-    ))
+    grid = np.meshgrid(np.arange(low_x + step / 2, high_x, step), np.arange(low_y + step / 2, high_y, step))
+    x, y = (g.ravel() for g in grid)
     inside = shapely.contains_xy(slab.region, x, y)
     flat = np.stack([x, y], axis=1)[inside]
     heights = slab.thickness.value * np.array([0.125, 0.375, 0.625, 0.875])

@@ -20,9 +20,11 @@ __all__ = ["join_across", "to_sheet"]
 
 
 def join_across(slabs: list[Slab], reach: float) -> list[Slab]:
-    """Join coplanar pieces that another board's end covers the gap between: that board stops here, this one runs through.
+    """Join coplanar pieces that another board's end covers the gap between: that board stops here, this one runs
+    through.
 
-    reach: how uncertain an outline is, mm. Where the other board goes on beyond the plane, it is the one that runs through.
+    reach: how uncertain an outline is, mm. Where the other board goes on beyond the plane, it is the one that runs
+    through.
     """
     slabs = list(slabs)
     while True:
@@ -48,9 +50,8 @@ def _joined(a: Slab, b: Slab, others: list[Slab], reach: float) -> Slab | None:
     other_region = Polygon(moved[:, :2]).buffer(0)
     gap = a.region.distance(other_region)
     for crossing in others:
-        if abs(
-            crossing.normal @ a.normal
-        ) > 0.9 or gap > 1.5 * crossing.thickness.value / _sine(crossing, a) + 2 * reach:
+        widest = 1.5 * crossing.thickness.value / _sine(crossing, a) + 2 * reach
+        if abs(crossing.normal @ a.normal) > 0.9 or gap > widest:
             continue
         if not _stops_at(crossing, a, reach):
             continue
@@ -71,9 +72,8 @@ def _sine(a: Slab, b: Slab) -> float:
 def _stops_at(crossing: Slab, slab: Slab, reach: float) -> bool:
     """Whether the crossing board lies on one side of the slab only."""
     rings = np.asarray(crossing.region.exterior.coords)
-    z = np.concatenate([slab.to_board(
-        crossing.to_world(np.c_[rings, np.full(len(rings), h)])
-    )[:, 2] for h in (0.0, crossing.thickness.value)])
+    corners = np.concatenate([np.c_[rings, np.full(len(rings), h)] for h in (0.0, crossing.thickness.value)])
+    z = slab.to_board(crossing.to_world(corners))[:, 2]
     return min(z.max() - slab.thickness.value, -z.min()) < 1.5 * reach
 
 
@@ -135,7 +135,5 @@ def _evidence(
     top = near[(np.abs(z - thickness) < tolerance) & (nz > 0.8)]
     bottom = near[(np.abs(z) < tolerance) & (nz < -0.8)]
     side = near[np.abs(nz) < 0.6]
-    rim = shapely.distance(
-        region.boundary, shapely.points(x[side, :2])
-    ) < 2 * tolerance if len(side) else np.zeros(0, bool)
+    rim = shapely.distance(region.boundary, shapely.points(x[side, :2])) < 2 * tolerance
     return top, bottom, side[rim]

@@ -1,7 +1,7 @@
 """Candidate boards: every plane that could be a sheet plane, with every thickness that the cloud supports.
 
-Paper, Cut Region Approximation and Initial Sheet Thickness Estimation. A candidate is the slab below a plane, inside the region
-that points on its two sheet planes cover.
+Paper, Cut Region Approximation and Initial Sheet Thickness Estimation. A candidate is the slab below a plane, inside
+the region that points on its two sheet planes cover.
 """
 
 from __future__ import annotations
@@ -75,9 +75,8 @@ def plane_frame(normal: np.ndarray, point: np.ndarray) -> np.ndarray:
 
 
 def candidate_slabs(
-    capture: Capture, around: Neighbourhood, planes: list[
-        Primitive
-    ], free: FreeSpace, photos: Photos, options: IdentifyOptions
+    capture: Capture, around: Neighbourhood, planes: list[Primitive], free: FreeSpace, photos: Photos,
+    options: IdentifyOptions,
 ) -> list[Slab]:
     """All candidates that are neither too thick for their region nor seen through, in the order of their planes."""
     scene = _Scene(capture, around, planes, free, options, photos)
@@ -115,9 +114,8 @@ def footprint(other: Slab, slab: Slab) -> Polygon:
     for corners in ends:
         ahead = np.roll(corners, -1, axis=0)
         for level in (low + 0.25 * (high - low), high - 0.25 * (high - low)):
-            share = (level - corners[:, 2]) / np.where(
-                np.abs(ahead[:, 2] - corners[:, 2]) < 1e-9, np.nan, ahead[:, 2] - corners[:, 2]
-            )
+            rise = ahead[:, 2] - corners[:, 2]
+            share = (level - corners[:, 2]) / np.where(np.abs(rise) < 1e-9, np.nan, rise)
             cross = (share >= 0) & (share <= 1)
             points.append((corners + share[:, None] * (ahead - corners))[cross, :2])
     crossing = np.concatenate(points)
@@ -125,7 +123,8 @@ def footprint(other: Slab, slab: Slab) -> Polygon:
 
 
 def _common(known: list[tuple[_Seed, list[ThicknessHypothesis]]], most: int = 2) -> list[ThicknessHypothesis]:
-    """The thicknesses that most of the object's sheet area has, for boards that show neither their back nor a cut face."""
+    """The thicknesses that most of the object's sheet area has, for boards that show neither their back nor a cut face.
+    """
     pairs = [(h[0].value, seed[2].area) for seed, h in known if h and h[0].evidence in ("opposite", "photos")]
     values, area = np.array(pairs).reshape(-1, 2).T
     found: list[ThicknessHypothesis] = []
@@ -173,7 +172,9 @@ class _Scene:
 
     @property
     def min_hole(self) -> float:
-        """Smaller gaps in a region are gaps in the cloud; whether a larger one is a hole in the wood the photographs tell."""
+        """Smaller gaps in a region are gaps in the cloud; whether a larger one is a hole in the wood the photographs
+        tell.
+        """
         return (self.options.min_hole_side * self.diameter) ** 2
 
     @property
@@ -182,14 +183,12 @@ class _Scene:
 
     def coplanar(self, normal: np.ndarray, point: np.ndarray) -> tuple[int, ...]:
         """Primitives on the plane through `point` that face along `normal`."""
-        tolerance = 3 * max(
-            self.options.inlier_sigmas * self.around.noise, self.options.inlier_floor * self.diameter
-        ) / 2
+        inlier = max(self.options.inlier_sigmas * self.around.noise, self.options.inlier_floor * self.diameter)
+        tolerance = 1.5 * inlier
         cos = np.cos(np.radians(self.options.opposite_degrees))
         return tuple(
-            k for k, p in enumerate(self.planes) if p.normal @ normal > cos and abs(
-                (p.centroid - point) @ normal
-            ) < tolerance
+            k for k, p in enumerate(self.planes)
+            if p.normal @ normal > cos and abs((p.centroid - point) @ normal) < tolerance
         )
 
     def points(self, numbers: tuple[int, ...]) -> np.ndarray:

@@ -1,7 +1,8 @@
-"""How thick a board is: from its opposite sheet plane, or from where its cut faces end (paper, Initial Sheet Thickness Estimation).
+"""How thick a board is: from its opposite sheet plane, or from where its cut faces end (paper, Initial Sheet Thickness
+Estimation).
 
-The evidence is found coarsely and then fitted: an opposite plane by its own least squares fit, a far end by the edge of the density of
-cut-face points along the depth.
+The evidence is found coarsely and then fitted: an opposite plane by its own least squares fit, a far end by the edge of
+the density of cut-face points along the depth.
 """
 
 from __future__ import annotations
@@ -151,8 +152,8 @@ def from_photos(
 ) -> list[ThicknessHypothesis]:
     """Depths below the sheet plane at which the photographs show an edge that follows the rim, strongest first.
 
-    Only places that cut-face points back are swept, in views that look at the cut face. The sheet plane's own edge at depth zero
-    calibrates the measure: a small offset of the plane cancels in the difference.
+    Only places that cut-face points back are swept, in views that look at the cut face. The sheet plane's own edge at
+    depth zero calibrates the measure: a small offset of the plane cancels in the difference.
     """
     keep = np.flatnonzero(rim.seen)
     if len(keep) < 20:
@@ -184,7 +185,9 @@ def _looking_at(
 
 
 def _peaks(sweep: SweepResult, limits: tuple[float, float]) -> list[ThicknessHypothesis]:
-    """Offsets that stand out, strongest first. An eased edge shows as two steps close together: the outer one is the board's."""
+    """Offsets that stand out, strongest first. An eased edge shows as two steps close together: the outer one is the
+    board's.
+    """
     s, t = sweep.strength / np.median(sweep.strength), sweep.offsets
     local = np.flatnonzero((s[1:-1] >= s[:-2]) & (s[1:-1] > s[2:]) & (s[1:-1] > 2.0)) + 1
     zero = [k for k in local if abs(t[k]) < limits[0]]
@@ -202,10 +205,11 @@ def _peaks(sweep: SweepResult, limits: tuple[float, float]) -> list[ThicknessHyp
 
 
 def sharpened(coarse: ThicknessHypothesis, photos: list[ThicknessHypothesis]) -> ThicknessHypothesis:
-    """The hypothesis with its value from the photographs, where they show an edge near it; an opposite face seen dimly is biased."""
-    near = [p for p in photos if abs(
-        p.value - coarse.value
-    ) < 0.08 * coarse.value + 3 * coarse.standard_error and p.support > 2.5]
+    """The hypothesis with its value from the photographs, where they show an edge near it; an opposite face seen dimly
+    is biased.
+    """
+    reach = 0.08 * coarse.value + 3 * coarse.standard_error
+    near = [p for p in photos if abs(p.value - coarse.value) < reach and p.support > 2.5]
     if not near:
         return coarse
     best = min(near, key=lambda p: abs(p.value - coarse.value))

@@ -33,9 +33,8 @@ def resized_contact(contact: Contact, new_from_model: np.ndarray) -> Contact:
 
     return contact.model_copy(update={
         "point": move(contact.point), "normal": tuple(float(x) for x in rigid[:3, :3] @ np.asarray(contact.normal)),
-        "interface": tuple(
-            tuple(move(p) for p in polygon) for polygon in contact.interface
-        ), "area": contact.area * scale**2,
+        "interface": tuple(tuple(move(p) for p in polygon) for polygon in contact.interface),
+        "area": contact.area * scale**2,
     })
 
 

@@ -1,4 +1,6 @@
-"""From rough boards to exact ones: outlines from photographs, curves, and the boards of the model (paper, Geometry Refinement)."""
+"""From rough boards to exact ones: outlines from photographs, curves, and the boards of the model (paper, Geometry
+Refinement).
+"""
 
 from __future__ import annotations
 

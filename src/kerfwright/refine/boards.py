@@ -1,4 +1,6 @@
-"""From a sheet and its fitted cut path to a board of the model: its own frame, bevels, and where each number comes from."""
+"""From a sheet and its fitted cut path to a board of the model: its own frame, bevels, and where each number comes
+from.
+"""
 
 from __future__ import annotations
 
@@ -21,16 +23,13 @@ def to_board(
     """A board with +x along its longest straight edge and the cut path's lower left corner at the origin."""
     turn, shift = _own_frame(path)
     model_from_board = sheet.world_from_board.copy()
-    model_from_board[:3, 3] = sheet.world_from_board[:3, :3] @ np.array(
-        [*(turn.T @ shift), 0.0]
-    ) + sheet.world_from_board[:3, 3]
+    model_from_board[:3, 3] += sheet.world_from_board[:3, :2] @ (turn.T @ shift)
     model_from_board[:3, :2] = sheet.world_from_board[:3, :2] @ turn.T
     bevels = [_bevel(path, s, sheet, turn, shift) for s in segments if s.normal is not None]
     points = len(sheet.top_idx) + len(sheet.bottom_idx) + len(sheet.cut_idx)
     return Board(
-        name=sheet.name, model_from_board=rows(model_from_board), thickness=sheet.thickness, cut_path=transform_path(
-            path, np.c_[turn, -shift]
-        ),
+        name=sheet.name, model_from_board=rows(model_from_board), thickness=sheet.thickness,
+        cut_path=transform_path(path, np.c_[turn, -shift]),
         bevels=tuple(b for b in bevels if b is not None), outline_origin=origin, points=points, notes=notes,
     )
 
@@ -64,9 +63,8 @@ def _bevel(
     inward = np.array([-along[1], along[0]])
     edges = [
         e for e in path.outer.edges if isinstance(e, Line)
-        and all(
-            abs((np.asarray(p) - segment.start) @ inward) < ON_SEGMENT for p in (e.start, e.end)
-        ) and _overlap(e, segment, along) > 1
+        and all(abs((np.asarray(p) - segment.start) @ inward) < ON_SEGMENT for p in (e.start, e.end))
+        and _overlap(e, segment, along) > 1
     ]
     if not edges:
         return None
@@ -77,9 +75,8 @@ def _bevel(
     point = np.array([*(turn @ segment.start - shift), segment.depth])
     return Bevel(
         start=tuple(map(float, place[0])), end=tuple(map(float, place[1])), point=tuple(map(float, point)),
-        normal=tuple(map(float, normal)), angle=Quantity(
-            value=float(angle), origin=Origin.IMPLIED
-        ), contact=segment.contact,
+        normal=tuple(map(float, normal)), angle=Quantity(value=float(angle), origin=Origin.IMPLIED),
+        contact=segment.contact,
     )
 
 

@@ -28,7 +28,9 @@ def outline_region(outline: Outline) -> Polygon:
 def constrained_region(
     region: Polygon, segments: tuple[ConstraintSegment, ...], reach: float, beyond: float
 ) -> Polygon:
-    """The region run on to each segment over its length (by at most `reach`) and cut off behind it (as far as `beyond`)."""
+    """The region run on to each segment over its length (by at most `reach`) and cut off behind it (as far as
+    `beyond`).
+    """
     for segment in segments:
         filled = shapely.union_all([region, *_filling(region, segment, reach)])
         region = _largest(filled.buffer(0.01).buffer(-0.01))
@@ -82,7 +84,8 @@ def _curtain(feet: np.ndarray, depth: np.ndarray, inward: np.ndarray) -> Polygon
 def to_loops(
     region: Polygon, outline: Outline, segments: tuple[ConstraintSegment, ...], step: float
 ) -> tuple[BoundaryLoop, ...]:
-    """Boundary loops of a region at even spacing; errors from the outline it came from, small on constraint segments."""
+    """Boundary loops of a region at even spacing; errors from the outline it came from, small on constraint segments.
+    """
     known = np.concatenate([loop.points for loop in outline.loops])
     error = np.concatenate([loop.standard_error for loop in outline.loops])
     tree, usual = cKDTree(known), float(np.median(error))
