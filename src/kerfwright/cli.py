@@ -6,6 +6,7 @@ wrong. 128 + n: ended by signal n.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -21,6 +22,9 @@ def main() -> None:
     if sys.argv[1:] in (["-V"], ["--version"]):  # answered before any import that could be broken
         print(f"kerfwright {__version__}")
         return
+    # Stages run boards and views in threads of their own. A BLAS that shares out its work as the machine's load has it
+    # sums in another order each time, and the last bits then differ from run to run.
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
     sys.exit(guarded(_run_app))
 
 
