@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kerfwright.capture.images import image_size
-from kerfwright.capture.parsing import capture_error, finite_float, read_text, whole_number
+from kerfwright.capture.parsing import capture_error, finite_float, read_lines, whole_number
 from kerfwright.capture.posed import PosedImage, checked_camera
 
 __all__ = ["find_bundler", "read_bundler"]
@@ -41,7 +41,7 @@ def read_bundler(path: Path, locate: Callable[[str], Path]) -> list[PosedImage]:
         If one of the two files is missing or damaged, or their numbers of images differ.
     """
     lines = [
-        line.split() for line in read_text(path).splitlines() if line.strip() and not line.lstrip().startswith("#")
+        line.split() for line in read_lines(path) if line.strip() and not line.lstrip().startswith("#")
     ]
     count = whole_number(lines[0][0] if lines else "", path, "number of cameras", least=1)
     names = _names(path.with_name("list.txt"), count)
@@ -66,7 +66,7 @@ def read_bundler(path: Path, locate: Callable[[str], Path]) -> list[PosedImage]:
 def _names(path: Path, count: int) -> list[str]:
     if not path.is_file():
         raise capture_error(path, "file", "missing", "Bundler's list of images belongs beside bundle.out")
-    lines = [line for line in read_text(path).splitlines() if line.strip()]
+    lines = [line for line in read_lines(path) if line.strip()]
     if len(lines) != count:
         raise capture_error(path, "images", len(lines), f"bundle.out has {count} cameras: export both files together")
     return [LIST_LINE.fullmatch(line.strip()).group("name") for line in lines]

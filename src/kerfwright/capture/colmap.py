@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from kerfwright.capture.camera import CAMERA_MODELS, Camera
-from kerfwright.capture.parsing import capture_error, finite_float, read_bytes, read_text, whole_number
+from kerfwright.capture.parsing import capture_error, finite_float, read_bytes, read_lines, whole_number
 from kerfwright.capture.posed import PosedImage, checked_camera, pose_matrix
 from kerfwright.errors import CaptureError
 
@@ -71,7 +71,7 @@ def _text_cameras(path: Path) -> dict[int, Camera]:
 
 def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Line number and words of each line that is neither empty nor a comment."""
-    for number, line in enumerate(read_text(path).splitlines(), 1):
+    for number, line in enumerate(read_lines(path), 1):
         if (words := line.split()) and not words[0].startswith("#"):
             yield number, words
 
@@ -93,7 +93,7 @@ def _text_camera(words: list[str], path: Path, field: str) -> tuple[int, Camera]
 def _text_images(path: Path, cameras: dict[int, Camera]) -> Iterator[PosedImage]:
     """A line with the pose, then a line with 2-D points that may be empty; some writers leave the empty one out."""
     points_next = False
-    for number, line in enumerate(read_text(path).splitlines(), 1):
+    for number, line in enumerate(read_lines(path), 1):
         words = line.split()
         if words and words[0].startswith("#"):
             continue

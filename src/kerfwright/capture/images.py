@@ -39,7 +39,8 @@ class ImageFinder:
         folders = (*self.folders, *((base,) if base else ()))
         for text in dict.fromkeys((name, name.replace("\\", "/"))):
             for folder in folders:
-                if (path := self._inside(folder, text, name, source)).is_file():
+                path = self._inside(folder, text, name, source)
+                if os.path.isfile(path):  # unlike Path.is_file, false for names that no file can have
                     return path
         raise capture_error(
             source, "image", name, f"no such file in {self.folders[0]}: put it there, or export cameras without it"

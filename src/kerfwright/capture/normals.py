@@ -14,10 +14,12 @@ __all__ = ["estimated_normals", "normals_or_estimates"]
 NEIGHBOURS = 16
 CHUNK = 100_000  # points at a time, to bound memory
 CELL = 3.0  # of the points' spacing: so wide a cell of a depth image is covered by whatever lies in front
-DEPTH = 1.5  # of the cell's width: how far behind the nearest point of its cell a point still counts as seen
+DEPTH = 1.0  # of the cell's width: how far behind its cell's nearest point a point counts as seen; less than a board
 MOST_VIEWS = 20  # that vote; more cost as much and tell less
-SAMPLE = 20_000  # points asked whether a file's normals point outwards
-MOST_INWARD = 0.08  # of them may face away from what sees them: up to 0.05 do in good stereo clouds, about thin edges
+SAMPLE_VIEWS = 8  # asked whether a file's normals point outwards
+SAMPLE = 20_000  # points whose spacing is measured
+CLEAR = 0.5  # votes that decide alone: a view squarely in front, or two at a slant
+MOST_INWARD = 0.05  # of the decided normals may face away; a hundredth does in good stereo clouds, about thin edges
 MOST_MISSING = 0.1  # of a file's normals may be zero or NaN: more, and all are estimated
 SPREAD_ROUNDS = 50  # of passing signs on to neighbours that no camera saw
 
@@ -48,20 +50,15 @@ def normals_or_estimates(
     if missing.any():
         unit[missing] = estimated_normals(points, views)[missing]
         notes = (f"{missing.sum()} normals of the cloud are zero or NaN: these were estimated",)
-    share = _inward_share(points, unit, views)
+    spacing = _spacing(points)
+    some = facing_votes(points, unit, views, spacing, SAMPLE_VIEWS)
+    share = float((some < -CLEAR).sum() / max(1, (np.abs(some) > CLEAR).sum()))
     if share <= MOST_INWARD:
         return unit, notes
     note = (
         f"{100 * share:.0f} % of the cloud's normals faced away from the cameras that see them: such were turned round"
     )
-    return turned_outwards(unit, facing_votes(points, unit, views, _spacing(points))), (*notes, note)
-
-
-def _inward_share(points: np.ndarray, normals: np.ndarray, views: Sequence[View]) -> float:
-    """Share of the normals, of those whose points a camera sees, that point into the material; from a sample."""
-    some = slice(None, None, max(1, len(points) // SAMPLE))
-    votes = facing_votes(points[some], normals[some], views, _spacing(points[some]))
-    return float((votes < 0).sum() / max(1, (votes != 0).sum()))
+    return turned_outwards(unit, facing_votes(points, unit, views, spacing) + CLEAR), (*notes, note)
 
 
 def _spacing(points: np.ndarray) -> float:
@@ -93,13 +90,15 @@ def _square_to_neighbours(points: np.ndarray, neighbour_idx: np.ndarray) -> np.n
     return normals
 
 
-def facing_votes(points: np.ndarray, normals: np.ndarray, views: Sequence[View], spacing: float) -> np.ndarray:
+def facing_votes(
+    points: np.ndarray, normals: np.ndarray, views: Sequence[View], spacing: float, most_views: int = MOST_VIEWS
+) -> np.ndarray:
     """Sum over the views that see a point of the cosine between its normal and the way to the camera, (N,).
 
     Negative where a normal points into the material, zero where no view sees the point.
     """
     votes = np.zeros(len(points))
-    for view in views[:: max(1, -(-len(views) // MOST_VIEWS))]:
+    for view in views[:: max(1, -(-len(views) // most_views))]:
         seen = _seen(points, view, spacing)
         to_camera = view.centre - points[seen]
         length = np.maximum(np.linalg.norm(to_camera, axis=1), np.finfo(float).tiny)

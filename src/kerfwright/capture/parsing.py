@@ -7,7 +7,7 @@ from pathlib import Path
 
 from kerfwright.errors import CaptureError
 
-__all__ = ["capture_error", "finite_float", "read_bytes", "read_text", "shown", "whole_number"]
+__all__ = ["capture_error", "finite_float", "read_bytes", "read_lines", "shown", "whole_number"]
 
 SHOWN_LENGTH = 60
 
@@ -70,8 +70,8 @@ def read_bytes(path: Path) -> bytes:
         raise capture_error(path, "file", error.strerror, "check that it exists and can be read") from error
 
 
-def read_text(path: Path) -> str:
-    """All of a UTF-8 text file, with or without a byte order mark.
+def read_lines(path: Path) -> list[str]:
+    """The lines of a UTF-8 text file, with or without a byte order mark, whatever ends them.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def read_text(path: Path) -> str:
     """
     data = read_bytes(path)
     try:
-        return data.decode("utf-8-sig")
+        return data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n").split("\n")
     except UnicodeDecodeError as error:
         raise capture_error(
             path, f"byte {error.start}", data[error.start : error.start + 4], "save the file as UTF-8"

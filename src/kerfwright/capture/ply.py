@@ -148,7 +148,9 @@ def _ascii_columns(file: BinaryIO, header: PlyHeader, index: int, wanted: list[i
     for element in header.elements[:index]:
         _pass_over(text, element)
     element = header.elements[index]
-    table = _ascii_table(_without_lists(text, element) if element.has_lists else text, element, wanted, header.path)
+    table = _ascii_table(
+        _without_lists(text, element) if element.has_lists else filter(str.strip, text), element, wanted, header.path
+    )
     if len(table) < element.count:
         raise _cut_short(header, element, len(table))
     kinds = [element.properties[i].kind for i in wanted]
