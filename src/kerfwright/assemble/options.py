@@ -24,5 +24,4 @@ class AssembleOptions:
     end_score: float = 2.8  # least edge strength that confirms a far end
     end_offset: float = 1 / 200
     min_contact: float = 1 / 100  # shortest interface
-    seam_images: bool = True
     seed: int = 0

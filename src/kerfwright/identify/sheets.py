@@ -119,7 +119,7 @@ def _polygon(rings: list[np.ndarray], rough: Polygon) -> Polygon:
 
 
 def _quantity(slab: Slab) -> Quantity:
-    origin = Origin.INFERRED if slab.thickness.evidence == "inferred" else Origin.MEASURED
+    origin = {"inferred": Origin.INFERRED, "ground": Origin.IMPLIED}.get(slab.thickness.evidence, Origin.MEASURED)
     return Quantity(value=slab.thickness.value, standard_error=slab.thickness.standard_error, origin=origin)
 
 

@@ -15,7 +15,6 @@ class RefineOptions:
 
     use_images: bool = True  # false: cut paths come from the cloud alone
     boundary_step: float = 1 / 450  # spacing of boundary points handed to curve fitting
-    rounds: int = 2  # assembly and outlines alternate at most so often
     seed: int = 0
 
 
