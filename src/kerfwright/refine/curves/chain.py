@@ -14,12 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfwright.refine.curves.options import CurveOptions
-from kerfwright.refine.curves.ranges import CHOICE, FREEDOM, LINE, RangeFits, fit_ranges
+from kerfwright.refine.curves.prices import edge_prices, line_prices
+from kerfwright.refine.curves.ranges import LINE, RangeFits, fit_ranges
 from kerfwright.refine.curves.samples import Samples
 from kerfwright.refine.curves.snap import GuideLine, Run
 
-__all__ = ["GUIDE", "Chain", "best_chain", "unit_price"]
+__all__ = ["GUIDE", "GUIDED", "Chain", "best_chain", "unit_price"]
 
+GUIDED = 1.0  # price of a line that is given: only of its being there
 GUIDE = 3  # a line on a guide line: no freedom of its own
 _TRUNCATION = 16.0  # chi-square of a stretch that a guide line overrides, per observation
 _ANGLE_SLACK, _OFFSET_SLACK, _SLIDE = 0.02, 0.1, 5.0  # radians, mm, mm: what the linearised join may be wrong by
@@ -96,11 +98,15 @@ def _edges(
     long_enough = gap * samples.spacing >= 0.8 * options.shortest_edge
     covered = _core_owners(samples, nodes, runs, gap)
     fits = fit_ranges(samples, nodes, long_enough & (covered == -1), 2 * price)
-    cost = fits.chi2 + price * (FREEDOM + CHOICE)
+    cost = fits.chi2 + price * edge_prices()
+    straight = line_prices(
+        fits.tangents[:, :, LINE, 0], np.sqrt(fits.angle_variance[:, :, LINE]), samples.main_direction
+    )
+    cost[:, :, LINE] = fits.chi2[:, :, LINE] + price * straight
     guided = np.full((count, count), np.inf)
     which = long_enough & (covered >= 0)
     for k, line in enumerate(lines):
-        guided = np.where(which & (covered == k), _guided_chi2(samples, nodes, line) + price * CHOICE[LINE], guided)
+        guided = np.where(which & (covered == k), _guided_chi2(samples, nodes, line) + price * GUIDED, guided)
     every = np.concatenate([cost, guided[..., None]], axis=2)
     keep = every < (_cheapest_cover(every.min(axis=2)) + 7 * price)[..., None]
     return _collected(samples, nodes, fits, every, keep, covered, lines)

@@ -13,13 +13,9 @@ import numpy as np
 
 from kerfwright.refine.curves.samples import Samples
 
-__all__ = ["ARC", "CHOICE", "CUBIC", "LINE", "RangeFits", "fit_circle", "fit_range", "fit_ranges", "line_chi2"]
+__all__ = ["ARC", "CUBIC", "LINE", "RangeFits", "fit_circle", "fit_range", "fit_ranges", "line_chi2"]
 
 LINE, ARC, CUBIC = 0, 1, 2
-FREEDOM = np.array([2.0, 3.0, 6.0])  # of a line, an arc, a cubic between two sharp nodes
-# What an edge costs besides, in the same unit: its node could be anywhere, and a line is the likeliest cut. With this a
-# square end beats a semicircle that fits as well, and one cubic two arcs.
-CHOICE = np.array([1.0, 2.75, 3.5])
 _OFFSET_GAIN = np.array([4.0, 9.0, 16.0])  # variance of a fitted polynomial at its end: (degree + 1)^2 / n
 _ANGLE_GAIN = np.array([12.0, 192.0, 1200.0])  # variance of its slope there, times length^2 / n
 _BATCH = 40

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from kerfwright.errors import StageError
+from kerfwright.refine.curves.prices import main_direction
 from kerfwright.refine.types import BoundaryLoop
 
 __all__ = ["Samples", "resample"]
@@ -58,6 +59,11 @@ class Samples:
         rows = np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y, x * z, y * z, z * z]) * self.weight[:, None]
         rows = np.column_stack([rows, self.sigma**2])
         return np.vstack([np.zeros(10), np.cumsum(np.vstack([rows, rows]), axis=0)])
+
+    @cached_property
+    def main_direction(self) -> float | None:
+        """Angle modulo 90 degrees along or across which most of the boundary runs."""
+        return main_direction(self.directions(12.0))
 
     def directions(self, reach: float) -> np.ndarray:
         """(N, 2) unit directions along the boundary from chords over +- `reach` mm."""

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kerfwright.refine.curves.chain import unit_price
+from kerfwright.refine.curves.chain import GUIDED, unit_price
 from kerfwright.refine.curves.options import CurveOptions
-from kerfwright.refine.curves.ranges import ARC, CHOICE, CUBIC, LINE, fit_range, line_chi2
+from kerfwright.refine.curves.prices import CHEAPEST_LINE, edge_prices, line_prices
+from kerfwright.refine.curves.ranges import ARC, CUBIC, LINE, fit_range, line_chi2
 from kerfwright.refine.curves.samples import Samples
 from kerfwright.refine.curves.shape import Shape, end_turn
 from kerfwright.refine.curves.snap import GuideLine
@@ -44,8 +45,19 @@ class _Move:
 
 def score(fit: Fit, samples: Samples, options: CurveOptions) -> float:
     """Chi-square and the price of the structure: what is minimised."""
-    kinds = np.array(fit.shape.kinds)
-    return fit.chi2 + unit_price(samples, options) * (fit.shape.freedom + float(CHOICE[kinds].sum()))
+    price = charges(fit.shape, samples).sum() - sum(fit.shape.smooth)
+    return fit.chi2 + unit_price(samples, options) * float(price)
+
+
+def charges(shape: Shape, samples: Samples) -> np.ndarray:
+    """(n,) prices of the edges, in degrees of freedom."""
+    sides = np.roll(shape.nodes, -1, axis=0) - shape.nodes
+    length = np.maximum(np.linalg.norm(sides, axis=1), 1e-6)
+    independent = np.maximum(length / (2 * samples.correlation), 1.0)
+    error = np.sqrt(12 / independent) * float(samples.sigma.mean()) / length
+    lines = line_prices(sides, error, samples.main_direction)
+    kinds = np.array(shape.kinds)
+    return np.where(np.array(shape.lines) >= 0, GUIDED, np.where(kinds == LINE, lines, edge_prices()[kinds]))
 
 
 def improve(fit: Fit, samples: Samples, guides: list[GuideLine], options: CurveOptions) -> Fit:
@@ -118,6 +130,7 @@ def _merges(fit: Fit, samples: Samples, options: CurveOptions) -> Iterator[_Move
     """One, two or three edges as one of any kind, where a free fit of their range promises a lower score."""
     shape, price = fit.shape, unit_price(samples, options)
     now = np.bincount(fit.edge, samples.weight * fit.distance**2, minlength=shape.count)
+    charge = charges(shape, samples)
     for count in (1, 2, 3):
         if shape.count - count < 1:
             continue
@@ -126,13 +139,16 @@ def _merges(fit: Fit, samples: Samples, options: CurveOptions) -> Iterator[_Move
             if any(shape.lines[k] >= 0 for k in edges):
                 continue
             span = _span(shape, first, count, samples.count)
-            paid = sum(now[k] + price * _charge(shape.kinds[k]) for k in edges)
+            paid = sum(now[k] + price * charge[k] for k in edges)
             paid -= price * sum(shape.smooth[k] for k in edges[1:])
             for kind in (LINE, ARC, CUBIC):
                 if count == 1 and kind == shape.kinds[first]:
                     continue
                 gain = (
-                    paid - fit_range(samples, *span, kind) - price * _charge(kind) + (2 * price if count > 1 else price)
+                    paid
+                    - fit_range(samples, *span, kind)
+                    - price * _least(kind)
+                    + price * _allowance(shape, first, count, samples)
                 )
                 yield _Move(first, count, kind, gain)
 
@@ -141,6 +157,7 @@ def _splits(fit: Fit, samples: Samples, options: CurveOptions) -> Iterator[_Move
     """Short curves that may be corners of two lines: dynamic programming only has the corners that it was offered."""
     shape, price = fit.shape, unit_price(samples, options)
     now = np.bincount(fit.edge, samples.weight * fit.distance**2, minlength=shape.count)
+    charge = charges(shape, samples)
     for k, (first, last) in enumerate(shape.ranges):
         at = np.arange(first + 2, last - 1)
         if shape.kinds[k] == LINE or (last - first) * samples.spacing > LONGEST_SPLIT or not len(at):
@@ -148,12 +165,23 @@ def _splits(fit: Fit, samples: Samples, options: CurveOptions) -> Iterator[_Move
         ends = np.full(len(at), first), np.full(len(at), min(last, 2 * samples.count - 1))
         both = line_chi2(samples, ends[0], at) + line_chi2(samples, at, ends[1])
         best = int(both.argmin())
-        paid = now[k] + price * (_charge(shape.kinds[k]) - shape.smooth[k] - shape.smooth[(k + 1) % shape.count])
-        yield _Move(k, 1, LINE, paid - float(both[best]) - price * (2 * _charge(LINE) - 1), int(at[best]))
+        paid = now[k] + price * (charge[k] - shape.smooth[k] - shape.smooth[(k + 1) % shape.count])
+        yield _Move(k, 1, LINE, paid - float(both[best]) - price * 2 * CHEAPEST_LINE, int(at[best]))
 
 
-def _charge(kind: int) -> float:
-    return (2.0, 3.0, 6.0)[kind] + float(CHOICE[kind])
+def _allowance(shape: Shape, first: int, count: int, samples: Samples) -> float:
+    """How much a move may look worse than it is, as its nodes stay where they are in the estimate.
+
+    The nodes of a short curve or of a cubic between smooth nodes can move far for the size of the edge.
+    """
+    if count > 1 or shape.kinds[first] == LINE:
+        return float(count)
+    start, stop = shape.ranges[first]
+    return 6.0 if shape.kinds[first] == CUBIC or (stop - start) * samples.spacing < LONGEST_SPLIT else 1.0
+
+
+def _least(kind: int) -> float:
+    return CHEAPEST_LINE if kind == LINE else float(edge_prices()[kind])
 
 
 def _span(shape: Shape, first: int, count: int, total: int) -> tuple[int, int]:

@@ -37,6 +37,11 @@ class Shape:
         """Number of edges, and of nodes."""
         return len(self.kinds)
 
+    @property
+    def nodes(self) -> np.ndarray:
+        """(n, 2) all nodes."""
+        return self.unknowns[: 2 * self.count].reshape(-1, 2)
+
     def node(self, k: int) -> np.ndarray:
         """(2,) node k, counted round."""
         k %= self.count
@@ -67,12 +72,6 @@ class Shape:
         centre = (a + b) / 2 - (1 - bulge**2) / (4 * bulge) * (_RIGHT @ (b - a))
         spoke = a - centre
         return centre, float(np.hypot(*spoke)), float(np.arctan2(spoke[1], spoke[0])), 4 * float(np.arctan(bulge))
-
-    @property
-    def freedom(self) -> int:
-        """Degrees of freedom, smooth nodes and guide lines taken off; lines of one kind meet in one node."""
-        own = sum(2 + EXTRA.get(kind, 0) for kind in self.kinds)
-        return own - sum(self.smooth) - 2 * sum(line >= 0 for line in self.lines)
 
 
 def _bounded(bulge: float) -> float:
