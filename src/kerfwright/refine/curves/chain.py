@@ -19,10 +19,11 @@ from kerfwright.refine.curves.ranges import LINE, RangeFits, fit_ranges
 from kerfwright.refine.curves.samples import Samples
 from kerfwright.refine.curves.snap import GuideLine, Run
 
-__all__ = ["GUIDE", "GUIDED", "Chain", "best_chain", "unit_price"]
+__all__ = ["GUIDE", "GUIDED", "SPIKE", "Chain", "best_chain", "unit_price"]
 
 GUIDED = 1.0  # price of a line that is given: only of its being there
 GUIDE = 3  # a line on a guide line: no freedom of its own
+SPIKE = 2.8  # radians: a node that turns more is a spike, not a cut
 _TRUNCATION = 16.0  # chi-square of a stretch that a guide line overrides, per observation
 _ANGLE_SLACK, _OFFSET_SLACK, _SLIDE = 0.02, 0.1, 5.0  # radians, mm, mm: what the linearised join may be wrong by
 
@@ -187,7 +188,7 @@ class _Join:
         turn = _angle(edges.tangents[a, 1], edges.tangents[b, 0])
         straight = (edges.curvature[a, 1] == 0) & (edges.curvature[b, 0] == 0)
         sharp = _sharp_cost(edges, a, b, samples, sample, price, options)
-        sharp = np.where((np.abs(turn) < options.sharp_angle) | (np.abs(turn) > 3.0), np.inf, sharp)
+        sharp = np.where((np.abs(turn) < options.sharp_angle) | (np.abs(turn) > SPIKE), np.inf, sharp)
         smooth = np.where(straight, np.inf, _smooth_cost(edges, a, b, turn) - price)
         self._sharp, self._smooth = sharp, smooth
         self.matrix = np.minimum(sharp, smooth)

@@ -69,8 +69,16 @@ def fit_curves(
     segments = [replace(s, start=np.asarray(s.start) - centre, end=np.asarray(s.end) - centre) for s in constraints]
     guides = guide_lines(segments)
     fits = [_fit_loop(_shifted(loop, -centre), guides, options) for loop in loops]
-    fits, relations = _polished(fits, guides, options)
-    return _result(fits, loops, guides, centre, relations)
+    polished, relations = _polished(fits, guides, options)
+    try:
+        return _result(polished, loops, guides, centre, relations)
+    except StageError:
+        if not relations:
+            raise
+        plain = _result(fits, loops, guides, centre, ())
+        return replace(
+            plain, notes=(*plain.notes, "relations between edges made the path cross itself and were left out")
+        )
 
 
 def _polished(

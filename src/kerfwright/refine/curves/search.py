@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from kerfwright.refine.curves.chain import GUIDED, unit_price
+from kerfwright.refine.curves.chain import GUIDED, SPIKE, unit_price
 from kerfwright.refine.curves.options import CurveOptions
 from kerfwright.refine.curves.prices import CHEAPEST_LINE, edge_prices, line_prices
 from kerfwright.refine.curves.ranges import ARC, CUBIC, LINE, fit_range, line_chi2
@@ -25,6 +26,7 @@ from kerfwright.refine.curves.start import inner_unknowns
 __all__ = ["improve", "score"]
 
 MOST_TRIALS = 40
+
 LONGEST_SPLIT = 60.0  # mm: longer curves are no corners
 MOST_TURN = 0.7  # radians: a sharp node that turns more is not tried smooth
 
@@ -33,14 +35,14 @@ MOST_TURN = 0.7  # radians: a sharp node that turns more is not tried smooth
 class _Move:
     """Edges first .. first + count - 1 (round the loop) become one edge of a kind.
 
-    With no edges node `first` becomes smooth; with `split`, a sample, edge `first` becomes two lines that meet there.
+    With no edges node `first` becomes smooth; with `split`, samples, edge `first` becomes lines that meet there.
     """
 
     first: int
     count: int
     kind: int
     gain: float  # estimated
-    split: int = -1
+    split: tuple[int, ...] = ()
 
 
 def score(fit: Fit, samples: Samples, options: CurveOptions) -> float:
@@ -71,13 +73,18 @@ def improve(fit: Fit, samples: Samples, guides: list[GuideLine], options: CurveO
             tried.add(key)
             trials += 1
             trial = solve(_applied(fit.shape, move, samples), samples, guides, steps=12)
-            if score(trial, samples, options) < best - 1e-6:
+            if score(trial, samples, options) < best - 1e-6 and not _has_spike(trial.shape):
                 fit = settled(trial, samples, guides)
                 best = score(fit, samples, options)
                 break
         else:
             return fit
     return fit
+
+
+def _has_spike(shape: Shape) -> bool:
+    """Whether the path turns back on itself at a node, which no saw can cut."""
+    return any(abs(end_turn(shape, k)) > SPIKE for k in range(shape.count))
 
 
 def settled(fit: Fit, samples: Samples, guides: list[GuideLine]) -> Fit:
@@ -108,7 +115,7 @@ def _with_ranges(shape: Shape, samples: Samples) -> Shape:
 
 def _key(shape: Shape, move: _Move) -> tuple:
     nodes = tuple(round(shape.ranges[(move.first + i) % shape.count][0] / 8) for i in range(move.count + 1))
-    return (nodes, move.kind, move.split >= 0, shape.count)
+    return (nodes, move.kind, len(move.split), shape.count)
 
 
 def _moves(fit: Fit, samples: Samples, options: CurveOptions) -> list[_Move]:
@@ -146,7 +153,7 @@ def _merges(fit: Fit, samples: Samples, options: CurveOptions) -> Iterator[_Move
                     continue
                 gain = (
                     paid
-                    - fit_range(samples, *span, kind)
+                    - fit_range(samples, *_believed(span, shape, first, count, kind), kind)
                     - price * _least(kind)
                     + price * _allowance(shape, first, count, samples)
                 )
@@ -154,19 +161,45 @@ def _merges(fit: Fit, samples: Samples, options: CurveOptions) -> Iterator[_Move
 
 
 def _splits(fit: Fit, samples: Samples, options: CurveOptions) -> Iterator[_Move]:
-    """Short curves that may be corners of two lines: dynamic programming only has the corners that it was offered."""
+    """Short or ill-fitting curves that may be two or three lines: dynamic programming has only some corners to
+    offer.
+    """
     shape, price = fit.shape, unit_price(samples, options)
     now = np.bincount(fit.edge, samples.weight * fit.distance**2, minlength=shape.count)
     charge = charges(shape, samples)
     for k, (first, last) in enumerate(shape.ranges):
-        at = np.arange(first + 2, last - 1)
-        if shape.kinds[k] == LINE or (last - first) * samples.spacing > LONGEST_SPLIT or not len(at):
+        short = (last - first) * samples.spacing < LONGEST_SPLIT
+        if shape.kinds[k] == LINE or last - first < 6 or not (short or now[k] > 4 * price):
             continue
-        ends = np.full(len(at), first), np.full(len(at), min(last, 2 * samples.count - 1))
-        both = line_chi2(samples, ends[0], at) + line_chi2(samples, at, ends[1])
-        best = int(both.argmin())
         paid = now[k] + price * (charge[k] - shape.smooth[k] - shape.smooth[(k + 1) % shape.count])
-        yield _Move(k, 1, LINE, paid - float(both[best]) - price * 2 * CHEAPEST_LINE, int(at[best]))
+        for parts in (2, 3):
+            split, chi2 = _best_split(samples, first, min(last, 2 * samples.count - 1), parts)
+            yield _Move(k, 1, LINE, paid - chi2 - price * parts * CHEAPEST_LINE, split)
+
+
+def _best_split(samples: Samples, first: int, last: int, parts: int) -> tuple[tuple[int, ...], float]:
+    """Samples between which 2 or 3 free lines fit best, and their chi-square."""
+    at = np.unique(np.linspace(first + 2, last - 2, min(last - first - 3, 60)).astype(int))
+    head = line_chi2(samples, np.full(len(at), first), at)
+    tail = line_chi2(samples, at, np.full(len(at), last))
+    if parts == 2:
+        best = int((head + tail).argmin())
+        return (int(at[best]),), float((head + tail)[best])
+    a, b = np.nonzero(at[None, :] - at[:, None] >= 3)
+    if not len(a):
+        return (int(at[0]),), np.inf
+    total = head[a] + line_chi2(samples, at[a], at[b]) + tail[b]
+    best = int(total.argmin())
+    return (int(at[a[best]]), int(at[b[best]])), float(total[best])
+
+
+def _believed(span: tuple[int, int], shape: Shape, first: int, count: int, kind: int) -> tuple[int, int]:
+    """The part of a merged range that is sure to stay in the edge: smooth nodes at its ends may move inwards a good
+    way.
+    """
+    margin = (span[1] - span[0]) // 6 if count > 1 and kind != LINE else 0
+    end = (first + count) % shape.count
+    return span[0] + margin * shape.smooth[first], span[1] - margin * shape.smooth[end]
 
 
 def _allowance(shape: Shape, first: int, count: int, samples: Samples) -> float:
@@ -174,8 +207,10 @@ def _allowance(shape: Shape, first: int, count: int, samples: Samples) -> float:
 
     The nodes of a short curve or of a cubic between smooth nodes can move far for the size of the edge.
     """
-    if count > 1 or shape.kinds[first] == LINE:
-        return float(count)
+    if count > 1:
+        return 4.0
+    if shape.kinds[first] == LINE:
+        return 1.0
     start, stop = shape.ranges[first]
     return 6.0 if shape.kinds[first] == CUBIC or (stop - start) * samples.spacing < LONGEST_SPLIT else 1.0
 
@@ -195,8 +230,8 @@ def _applied(shape: Shape, move: _Move, samples: Samples) -> Shape:
     if move.count == 0:
         smooth = tuple(s or k == move.first for k, s in enumerate(shape.smooth))
         return Shape(shape.unknowns, shape.kinds, shape.lines, smooth, shape.ranges)
-    if move.split >= 0:
-        return _halved(shape, move, samples)
+    if move.split:
+        return _cut_up(shape, move, samples)
     n = shape.count
     order = [(move.first + i) % n for i in range(n)]
     kept = order[move.count :]
@@ -215,17 +250,16 @@ def _both_lines(kinds: tuple[int, ...], i: int) -> bool:
     return kinds[i] == LINE and kinds[i - 1] == LINE
 
 
-def _halved(shape: Shape, move: _Move, samples: Samples) -> Shape:
-    """Edge `move.first` as two lines with a sharp node between them."""
+def _cut_up(shape: Shape, move: _Move, samples: Samples) -> Shape:
+    """Edge `move.first` as lines with sharp nodes between them."""
     k, n = move.first, shape.count
-    order = [k, -1, *((k + 1 + i) % n for i in range(n - 1))]
-    first, last = shape.ranges[k]
-    ranges = ((first, move.split), (move.split % samples.count, move.split % samples.count + last - move.split))
-    nodes = [shape.node(k), samples.points[move.split % samples.count], *(shape.node(i) for i in order[2:])]
-    kinds = (LINE, LINE, *(shape.kinds[i] for i in order[2:]))
+    kept = [(k + 1 + i) % n for i in range(n - 1)]
+    order = [k, *(-1 for _ in move.split), *kept]
+    cuts = [shape.ranges[k][0], *move.split, shape.ranges[k][1]]
+    ranges = [(a % samples.count, a % samples.count + b - a) for a, b in pairwise(cuts)]
+    nodes = [shape.node(k), *(samples.points[i % samples.count] for i in move.split), *(shape.node(i) for i in kept)]
+    kinds = (*(LINE for _ in ranges), *(shape.kinds[i] for i in kept))
     smooth = tuple(i >= 0 and shape.smooth[i] and not _both_lines(kinds, at) for at, i in enumerate(order))
-    lines = (-1, -1, *(shape.lines[i] for i in order[2:]))
-    inner = [shape.unknowns[shape.extra(i)] for i in order[2:]]
-    return Shape(
-        np.concatenate([*nodes, *inner]), kinds, lines, smooth, (*ranges, *(shape.ranges[i] for i in order[2:]))
-    )
+    lines = (*(-1 for _ in ranges), *(shape.lines[i] for i in kept))
+    inner = [shape.unknowns[shape.extra(i)] for i in kept]
+    return Shape(np.concatenate([*nodes, *inner]), kinds, lines, smooth, (*ranges, *(shape.ranges[i] for i in kept)))
