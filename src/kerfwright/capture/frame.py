@@ -50,11 +50,12 @@ def _moved_view(view: View, scale: float, turn: np.ndarray, shift: np.ndarray) -
 def rotation_between(source: np.ndarray, target: np.ndarray) -> np.ndarray:
     """The smallest turn, 3x3, that takes the direction `source` (unit, (3,)) to `target`."""
     axis, cosine = np.cross(source, target), float(source @ target)
-    if cosine < -1 + 1e-12:  # opposite: half a turn about any axis square to them
-        side = np.eye(3)[np.abs(source).argmin()]
-        axis = np.cross(source, side)
+    if cosine < 0:  # half a turn about the same axis first: what is left is well conditioned
+        if np.linalg.norm(axis) < 1e-6:
+            axis = np.cross(source, np.eye(3)[np.abs(source).argmin()])
+        axis -= (axis @ source) * source
         axis /= np.linalg.norm(axis)
-        return 2 * np.outer(axis, axis) - np.eye(3)
+        return rotation_between(-source, target) @ (2 * np.outer(axis, axis) - np.eye(3))
     cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
     return np.eye(3) + cross + cross @ cross / (1 + cosine)
 

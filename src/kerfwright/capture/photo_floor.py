@@ -28,18 +28,39 @@ DEEPEST = 0.10  # of the object's size: how far under its lowest points the floo
 ROUNDS = ((160, 0.004, 28), (400, 0.0015, 7), (720, 0.0008, 5))
 WINDOW = 9  # cells a side of the patches that are compared
 LEAST_PEAK = 0.2  # correlation at the floor; between unlike pictures it is about zero
-LEAST_RISE = 0.15  # of the peak above the median over all heights
-FEWEST_PATCHES = 500  # windows seen by three views or more
+LEAST_RISE = 0.15  # of the peak above the least in its range
+TILES = 6  # along each side: parts of the floor whose heights are looked for apart, so that they tell its tilt
+FEWEST_TILES = 5  # with a peak
+FEWEST_PATCHES = 60  # windows of a tile that three views or more see
 POINTS = 40_000  # of the cloud; enough to cover the object's shadow
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PhotoFloor:
-    """Height of the floor, its correlation there, and how many photographs were compared."""
+    """The plane normal @ x = offset, unit normal up.
 
+    Its height under the object, the standard error of its tilt in radians, and how many photographs were compared.
+    """
+
+    normal: np.ndarray
+    offset: float
     height: float
-    correlation: float
+    tilt_error: float
     views: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Plane:
+    """z = height + slope @ (xy - middle), and the standard error of the slope."""
+
+    middle: np.ndarray
+    height: float
+    slope: np.ndarray
+    slope_error: float = np.inf
+
+    def raised(self, offset: float) -> np.ndarray:
+        """The plane at an offset in z as a row, (3,): z = row @ (x, y, 1)."""
+        return np.array([*self.slope, self.height + offset - self.slope @ self.middle])
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +70,17 @@ class _Grid:
     low: np.ndarray
     cell: float
     shape: tuple[int, int]  # rows along y, columns along x
+
+    @property
+    def middle(self) -> np.ndarray:
+        """(2,): x and y."""
+        return self.low + 0.5 * self.cell * np.array(self.shape[::-1])
+
+    @property
+    def tile(self) -> np.ndarray:
+        """Number of the tile that each cell lies in, rows x columns."""
+        row, column = (np.arange(n) * TILES // n for n in self.shape)
+        return row[:, None] * TILES + column
 
     @property
     def world_from_index(self) -> np.ndarray:
@@ -84,23 +116,56 @@ def floor_in_photos(views: Sequence[View], cloud: Cloud, lowest: float) -> Photo
         return None
     with ThreadPoolExecutor() as pool:
         greys = list(pool.map(_grey, views))
-    found = _search(views, greys, cloud, lowest - DEEPEST * cloud.diameter)
-    return None if found is None else PhotoFloor(*found, len(views))
+    plane = _search(views, greys, cloud, lowest)
+    if plane is None:
+        return None
+    normal = np.array([*-plane.slope, 1.0]) / np.sqrt(1 + plane.slope @ plane.slope)
+    return PhotoFloor(
+        normal, float(normal @ [*plane.middle, plane.height]), plane.height, plane.slope_error, len(views)
+    )
 
 
-def _search(
-    views: Sequence[View], greys: Sequence[np.ndarray], cloud: Cloud, deepest: float
-) -> tuple[float, float] | None:
-    """Height and correlation of the floor, looked for from `deepest` upwards; None without a clear peak."""
-    (cells, step, count), *closer = ROUNDS
-    heights = deepest + np.arange(count) * step * cloud.diameter
-    scores = _sweep(views, greys, cloud, heights, cells)
-    found = _peak(heights, scores) if scores.max() - np.median(scores) >= LEAST_RISE else None
-    for cells, step, count in closer:
-        if found is not None:
-            heights = found[0] + (np.arange(count) - count // 2) * step * cloud.diameter
-            found = _peak(heights, _sweep(views, greys, cloud, heights, cells))
-    return found
+def _search(views: Sequence[View], greys: Sequence[np.ndarray], cloud: Cloud, lowest: float) -> _Plane | None:
+    """The plane of the floor, looked for about the lowest points; None without clear peaks over the whole range."""
+    plane = None
+    for cells, step, count in ROUNDS:
+        grid = _grid(views, cloud, cells)
+        offsets = (np.arange(count) - count // 2) * step * cloud.diameter
+        about = plane or _Plane(grid.middle, lowest - DEEPEST * cloud.diameter - offsets[0], np.zeros(2))
+        pictures = [_picture(view, grey, cloud, grid, about.height) for view, grey in zip(views, greys, strict=True)]
+        scores, patches = _sweep(pictures, grid, about, offsets)
+        closer = _fitted(about, grid, offsets, scores, patches, 0.0 if plane else LEAST_RISE)
+        if closer is None:
+            break  # what the rounds before found cannot be told more exactly from these photographs
+        plane = closer
+    return plane
+
+
+def _fitted(
+    plane: _Plane, grid: _Grid, offsets: np.ndarray, scores: np.ndarray, patches: np.ndarray, least_rise: float
+) -> _Plane | None:
+    """The plane through the peaks of all tiles; None with too few."""
+    peaks = [_peak(offsets, score, least_rise) for score in scores.T]
+    good = [t for t, peak in enumerate(peaks) if peak is not None and patches[:, t].min() >= FEWEST_PATCHES]
+    if len(good) < FEWEST_TILES:
+        return None
+    row, column = np.divmod(good, TILES)
+    place = (np.stack([column, row], axis=1) + 0.5) / TILES * grid.cell * np.array(grid.shape[::-1])
+    design = np.c_[place + grid.low - plane.middle, np.ones(len(good))]
+    fit, error = _robust_fit(design, np.array([peaks[t] for t in good]), 0.05 * float(offsets[1] - offsets[0]))
+    return _Plane(plane.middle, plane.height + float(fit[2]), plane.slope + fit[:2], error)
+
+
+def _robust_fit(design: np.ndarray, heights: np.ndarray, least_spread: float) -> tuple[np.ndarray, float]:
+    """Coefficients, (3,), and the standard error of the first two; tiles that peak elsewhere lose their weight."""
+    weight = np.ones(len(heights))
+    for _ in range(10):
+        fit = np.linalg.lstsq(design * weight[:, None], heights * weight, rcond=None)[0]
+        residual = heights - design @ fit
+        spread = max(1.4826 * float(np.median(np.abs(residual))), least_spread)
+        weight = 1 / (1 + (residual / (2 * spread)) ** 2)
+    covariance = np.linalg.pinv((design * weight[:, None]).T @ (design * weight[:, None])) * spread**2
+    return fit, float(np.sqrt(covariance[:2, :2].trace()))
 
 
 def _looking_down(views: Sequence[View], lowest: float, cloud: Cloud) -> list[View]:
@@ -130,20 +195,25 @@ def _grey(view: View) -> np.ndarray:
 
 
 def _sweep(
-    views: Sequence[View], greys: Sequence[np.ndarray], cloud: Cloud, heights: np.ndarray, cells: int
-) -> np.ndarray:
-    """Correlation of the pictures at each height, (H,)."""
-    grid = _grid(cloud, cells)
-    pictures = [
-        _picture(view, grey, cloud, grid, float(heights.mean())) for view, grey in zip(views, greys, strict=True)
-    ]
-    return np.array([_correlation(pictures, grid, height) for height in heights])
+    pictures: Sequence[_Picture], grid: _Grid, plane: _Plane, offsets: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean correlation in each tile with the plane at each offset, (H, T), and of how many windows it is the mean."""
+    tile = grid.tile.ravel()
+    scores, patches = np.zeros((2, len(offsets), TILES * TILES))
+    for i, offset in enumerate(offsets):
+        correlation, several = _correlation(pictures, grid, plane.raised(offset))
+        patches[i] = np.bincount(tile, several.ravel(), TILES * TILES)
+        scores[i] = np.bincount(tile, correlation.ravel(), TILES * TILES) / np.maximum(patches[i], 1)
+    return scores, patches
 
 
-def _grid(cloud: Cloud, cells: int) -> _Grid:
+def _grid(views: Sequence[View], cloud: Cloud, cells: int) -> _Grid:
+    """The object's surroundings in so many cells, but none smaller than a pixel sees."""
     xy = cloud.points[:, :2]
     low, high = xy.min(axis=0) - AROUND * cloud.diameter, xy.max(axis=0) + AROUND * cloud.diameter
-    cell = float((high - low).max()) / cells
+    middle = np.median(cloud.points, axis=0)
+    pixel = np.median([np.linalg.norm(view.centre - middle) / view.camera.focal for view in views])
+    cell = max(float((high - low).max()) / cells, float(pixel))
     columns, rows = np.ceil((high - low) / cell).astype(int)
     return _Grid(low, cell, (int(rows), int(columns)))
 
@@ -176,8 +246,8 @@ def _unshadowed(centre: np.ndarray, cloud: Cloud, grid: _Grid, height: float) ->
     return cv2.dilate(shadow, np.ones((WINDOW, WINDOW), np.uint8)) == 0
 
 
-def _correlation(pictures: Sequence[_Picture], grid: _Grid, height: float) -> float:
-    """Mean correlation over pairs of pictures and over windows that three or more of them see; -1 where too few do.
+def _correlation(pictures: Sequence[_Picture], grid: _Grid, z_of_xy1: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean correlation over pairs of pictures about each cell, and where three or more see it; zero elsewhere.
 
     With z the pictures normalised in each window, the sum over pairs of their products is (|sum z|^2 - n) / 2.
     """
@@ -185,23 +255,20 @@ def _correlation(pictures: Sequence[_Picture], grid: _Grid, height: float) -> fl
 
     total, count = np.zeros(grid.shape, np.float32), np.zeros(grid.shape, np.float32)
     for picture in pictures:
-        values, whole = _normalised(*_laid_on(picture, grid, height))
+        values, whole = _normalised(*_laid_on(picture, grid, z_of_xy1))
         total += values
         count += whole
     square = cv2.boxFilter(total * total, -1, (WINDOW, WINDOW))
     several = count >= 3
-    if several.sum() < FEWEST_PATCHES:
-        return -1.0
-    n = count[several]
-    return float(((square[several] - n) / (n * (n - 1))).mean())
+    return np.where(several, (square - count) / np.maximum(count * (count - 1), 1), 0), several
 
 
-def _laid_on(picture: _Picture, grid: _Grid, height: float) -> tuple[np.ndarray, np.ndarray]:
-    """The picture on the plane z = height, and a mask of cells that it shows."""
+def _laid_on(picture: _Picture, grid: _Grid, z_of_xy1: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The picture on the plane z = z_of_xy1 @ (x, y, 1), and a mask of cells that it shows."""
     import cv2
 
-    m = picture.index_from_world
-    homography = np.stack([m[:, 0], m[:, 1], m[:, 2] * height + m[:, 3]], axis=1) @ grid.world_from_index
+    world_from_plane = np.array([[1, 0, 0], [0, 1, 0], z_of_xy1, [0, 0, 1]])
+    homography = picture.index_from_world @ world_from_plane @ grid.world_from_index
     laid = cv2.warpPerspective(
         picture.grey, homography, grid.shape[::-1], flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderValue=-1e4
     )
@@ -221,14 +288,10 @@ def _normalised(values: np.ndarray, shown: np.ndarray) -> tuple[np.ndarray, np.n
     return np.where(whole, (values - mean) / deviation, 0).astype(np.float32), whole
 
 
-def _peak(heights: np.ndarray, scores: np.ndarray) -> tuple[float, float] | None:
-    """Place and height of the highest peak, by a parabola through its top; None where it is low or at the end."""
+def _peak(offsets: np.ndarray, scores: np.ndarray, least_rise: float) -> float | None:
+    """Place of the highest peak, by a parabola through its top; None where it is low, or at the end of the range."""
     i = int(scores.argmax())
-    if not 0 < i < len(scores) - 1 or scores[i] < LEAST_PEAK:
+    if not 0 < i < len(scores) - 1 or scores[i] < LEAST_PEAK or scores[i] - scores.min() < least_rise:
         return None
-    near = np.abs(np.arange(len(scores)) - i) <= 1
-    near |= (np.abs(np.arange(len(scores)) - i) <= 2) & (scores > 0.5 * scores[i])
-    steps = np.arange(len(scores))[near] - i
-    curve, slope, _ = np.polyfit(steps, scores[near], 2)
-    shift = float(np.clip(-0.5 * slope / curve, -1, 1)) if curve < 0 else 0.0
-    return float(heights[i] + shift * (heights[1] - heights[0])), float(scores[i])
+    before, at, after = scores[i - 1 : i + 2]
+    return float(offsets[i] + 0.5 * (before - after) / (before - 2 * at + after) * (offsets[1] - offsets[0]))

@@ -12,14 +12,16 @@ import numpy as np
 from kerfwright.capture.crop import Cropped, above_floor, crop_to_object, focus
 from kerfwright.capture.floor import Floor, find_floor
 from kerfwright.capture.frame import moved, rotation_between, similarity
+from kerfwright.capture.level import up_of_object
 from kerfwright.capture.photo_floor import floor_in_photos
-from kerfwright.capture.types import Capture
+from kerfwright.capture.types import Capture, Cloud
 from kerfwright.capture.yaw import upright_turn
 from kerfwright.errors import CaptureError
 
 __all__ = ["PrepareOptions", "prepare"]
 
 Z = np.array([0.0, 0.0, 1.0])
+LEAST_TILT = np.radians(0.05)  # of the floor in photographs that is put right; they show it to half of this
 FEWEST_POINTS = 100  # as for a cloud as read
 
 
@@ -62,9 +64,8 @@ def prepare(capture: Capture, options: PrepareOptions | None = None) -> Capture:
     capture, floor = _levelled(capture, options)
     if options.crop:
         capture = _cropped(capture, floor)
-    ground, notes = (floor.offset, ()) if floor else _ground(capture, options)
-    capture = replace(capture, notes=(*capture.notes, *notes))
-    capture = moved(capture, similarity(1.0, upright_turn(capture.cloud), np.zeros(3)))
+    capture, ground = (capture, floor.offset) if floor else _stood_on_floor(capture, options)
+    capture = _straight(capture)
     low, high = np.percentile(capture.cloud.points[:, :2], (0.1, 99.9), axis=0)
     scale = capture.scale.millimetres_per_unit
     return moved(capture, similarity(scale, np.eye(3), -scale * np.array([*(low + high) / 2, ground])))
@@ -74,14 +75,31 @@ def _levelled(capture: Capture, options: PrepareOptions) -> tuple[Capture, Floor
     """The capture with its floor level, and that floor."""
     if options.ground is not None:
         return capture, Floor(Z, options.ground, 0.0)
-    centres = np.array([view.centre for view in capture.views]).reshape(-1, 3)
-    floor = find_floor(capture.cloud, centres, np.random.default_rng(options.seed))
+    floor = _find_floor(capture, np.random.default_rng(options.seed))
     if floor is None:
         return capture, None
-    tilt = np.degrees(np.arccos(np.clip(floor.normal @ Z, -1, 1)))
-    note = f"the floor was found; it was tilted by {tilt:.2f} degrees and is level now"
-    turned = moved(capture, similarity(1.0, rotation_between(floor.normal, Z), np.zeros(3)))
-    return replace(turned, notes=(*capture.notes, note)), Floor(Z, floor.offset, floor.noise)
+    level = _turned_up(capture, floor.normal, "the floor was found; it was {} and is level now")
+    return level, replace(floor, normal=Z)
+
+
+def _find_floor(capture: Capture, generator: np.random.Generator) -> Floor | None:
+    """The floor below the object; where there is none that way, one that lies otherwise: the up axis was wrong."""
+    centres = np.array([view.centre for view in capture.views]).reshape(-1, 3)
+    for up in (Z, *(sign * axis for axis in np.eye(3)[:2] for sign in (1.0, -1.0)), -Z):
+        turn = rotation_between(up, Z)
+        if up is not Z and len(centres) < 3:
+            break  # only cameras tell a floor from a wall
+        cloud = capture.cloud if up is Z else Cloud(capture.cloud.points @ turn.T, capture.cloud.normals @ turn.T)
+        if floor := find_floor(cloud, centres @ turn.T, generator):
+            return replace(floor, normal=turn.T @ floor.normal)
+    return None
+
+
+def _turned_up(capture: Capture, normal: np.ndarray, note: str) -> Capture:
+    """The capture with `normal` upwards, and a note in which {} is the tilt."""
+    tilt = np.degrees(np.arccos(np.clip(normal @ Z, -1, 1)))
+    turned = moved(capture, similarity(1.0, rotation_between(normal, Z), np.zeros(3)))
+    return replace(turned, notes=(*capture.notes, note.format(f"tilted by {tilt:.2f} degrees")))
 
 
 def _cropped(capture: Capture, floor: Floor | None) -> Capture:
@@ -101,18 +119,33 @@ def _cropped(capture: Capture, floor: Floor | None) -> Capture:
     return replace(capture, cloud=cloud, notes=(*notes, *cropped.notes))
 
 
-def _ground(capture: Capture, options: PrepareOptions) -> tuple[float, tuple[str, ...]]:
-    """Height of a floor that is not in the cloud: from the photographs, or where the object begins."""
-    cloud = capture.cloud
-    lowest = robust_lowest(cloud.points[:, 2])
-    found = floor_in_photos(capture.views, cloud, lowest) if options.photos else None
-    if found is None:
-        return lowest, ("no floor was found: the lowest points of the object are taken to stand on it",)
-    below = 100 * (lowest - found.height) / cloud.diameter
-    return found.height, (
-        f"the floor is not in the cloud; {found.views} photographs show it {below:.2f} % of the object's size "
-        "below its lowest points",
+def _straight(capture: Capture) -> Capture:
+    return moved(capture, similarity(1.0, upright_turn(capture.cloud), np.zeros(3)))
+
+
+def _stood_on_floor(capture: Capture, options: PrepareOptions) -> tuple[Capture, float]:
+    """The capture level, and the height of a floor that is not in the cloud."""
+    up = up_of_object(capture.cloud)
+    if up is not None:
+        capture = _turned_up(capture, up, "the object was {} against its boards or feet and is level now")
+    capture = _straight(
+        capture
+    )  # the search looks at squares along x and y: the same ones however the capture was turned
+    lowest = robust_lowest(capture.cloud.points[:, 2])
+    floor = floor_in_photos(capture.views, capture.cloud, lowest) if options.photos else None
+    if floor is None:
+        note = "no floor was found: the lowest points of the object are taken to stand on it"
+        return replace(capture, notes=(*capture.notes, note)), lowest
+    below = 100 * (lowest - floor.height) / capture.cloud.diameter
+    note = (
+        f"the floor is not in the cloud; {floor.views} photographs show it {below:.2f} % of the object's size "
+        "below its lowest points"
     )
+    capture = replace(capture, notes=(*capture.notes, note))
+    if np.arccos(min(1.0, floor.normal[2])) <= max(3 * floor.tilt_error, LEAST_TILT):
+        return capture, floor.height
+    level = _turned_up(capture, floor.normal, "the floor in the photographs was {} and is level now")
+    return level, floor.offset
 
 
 def robust_lowest(heights: np.ndarray) -> float:
