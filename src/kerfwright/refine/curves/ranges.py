@@ -19,7 +19,6 @@ LINE, ARC, CUBIC = 0, 1, 2
 _OFFSET_GAIN = np.array([4.0, 9.0, 16.0])  # variance of a fitted polynomial at its end: (degree + 1)^2 / n
 _ANGLE_GAIN = np.array([12.0, 192.0, 1200.0])  # variance of its slope there, times length^2 / n
 _BATCH = 40
-_SLIDE = 4.0  # correlation lengths that a cubic may slide along itself under its parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,13 +190,13 @@ def _cubics(samples: Samples, first: np.ndarray, last: np.ndarray) -> tuple[np.n
         control = _solve_cubics(points, weight, t)
         t = _closer(control, points, t)
     control = _solve_cubics(points, weight, t)
-    chi2 = _normal_chi2(control, points, weight, t, np.inf)
+    chi2 = _normal_chi2(control, points, weight, t)
     near = np.flatnonzero(chi2 < 20 + 10 * (last - first) * samples.spacing / (2 * samples.correlation))
     for _ in range(4):
         t[near] = _closer(control[near], points[near], t[near])
         control[near] = _tangent_step(control[near], points[near], weight[near], t[near])
     t[near] = _closer(control[near], points[near], t[near])
-    chi2[near] = _normal_chi2(control[near], points[near], weight[near], t[near], _SLIDE * samples.correlation)
+    chi2[near] = _normal_chi2(control[near], points[near], weight[near], t[near])
     ends = control[:, [0, 3]]
     tangents = control[:, [1, 3]] - control[:, [0, 2]]
     tangents /= np.maximum(np.linalg.norm(tangents, axis=2, keepdims=True), 1e-12)
@@ -214,18 +213,11 @@ def _left(vectors: np.ndarray) -> np.ndarray:
     return np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
 
 
-def _normal_chi2(
-    control: np.ndarray, points: np.ndarray, weight: np.ndarray, t: np.ndarray, slack: float
-) -> np.ndarray:
-    """Chi-square of the distances across the curve; those along it are a matter of parameters, up to a slack in mm.
-
-    Beyond that the curve takes another course than the points, and passes near them by chance.
-    """
+def _normal_chi2(control: np.ndarray, points: np.ndarray, weight: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Chi-square of the distances across the curve; those along it are only a matter of parameters."""
     gap = points - _basis(t) @ control
-    velocity = _velocity(control, t)
-    across = (gap * _left(velocity)).sum(axis=2)
-    along = np.sqrt(np.maximum((gap**2).sum(axis=2) - across**2, 0))
-    return (weight * (across**2 + np.maximum(along - slack, 0) ** 2)).sum(axis=1)
+    across = (gap * _left(_velocity(control, t))).sum(axis=2)
+    return (weight * across**2).sum(axis=1)
 
 
 def _tangent_step(control: np.ndarray, points: np.ndarray, weight: np.ndarray, t: np.ndarray) -> np.ndarray:

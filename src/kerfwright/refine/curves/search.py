@@ -27,6 +27,7 @@ __all__ = ["improve", "score"]
 
 MOST_TRIALS = 40
 
+SHARPEST_FILLET = 0.1  # radians between lines below which their corner is nowhere
 LONGEST_SPLIT = 60.0  # mm: longer curves are no corners
 MOST_TURN = 0.7  # radians: a sharp node that turns more is not tried smooth
 
@@ -72,7 +73,7 @@ def improve(fit: Fit, samples: Samples, guides: list[GuideLine], options: CurveO
                 continue
             tried.add(key)
             trials += 1
-            trial = solve(_applied(fit.shape, move, samples), samples, guides, steps=12)
+            trial = solve(_applied(fit.shape, move, samples), samples, guides, steps=20)
             if score(trial, samples, options) < best - 1e-6 and not _has_spike(trial.shape):
                 fit = settled(trial, samples, guides)
                 best = score(fit, samples, options)
@@ -194,12 +195,13 @@ def _best_split(samples: Samples, first: int, last: int, parts: int) -> tuple[tu
 
 
 def _believed(span: tuple[int, int], shape: Shape, first: int, count: int, kind: int) -> tuple[int, int]:
-    """The part of a merged range that is sure to stay in the edge: smooth nodes at its ends may move inwards a good
-    way.
+    """The part of a range that is sure to stay in the edge: a cubic that should be an arc may have eaten into its
+    lines.
     """
-    margin = (span[1] - span[0]) // 6 if count > 1 and kind != LINE else 0
-    end = (first + count) % shape.count
-    return span[0] + margin * shape.smooth[first], span[1] - margin * shape.smooth[end]
+    if count > 1 or kind != ARC or shape.kinds[first] != CUBIC:
+        return span
+    margin = (span[1] - span[0]) // 3
+    return span[0] + margin * shape.smooth[first], span[1] - margin * shape.smooth[(first + 1) % shape.count]
 
 
 def _allowance(shape: Shape, first: int, count: int, samples: Samples) -> float:
@@ -241,9 +243,37 @@ def _applied(shape: Shape, move: _Move, samples: Samples) -> Shape:
     ranges = (_span(shape, move.first, move.count, samples.count), *(shape.ranges[k] for k in kept))
     smooth = tuple(shape.smooth[k] and not _both_lines(kinds, i) for i, k in enumerate(starts))
     nodes = [shape.node(k) for k in starts]
-    inner = [inner_unknowns(move.kind, nodes[0], nodes[1 % len(nodes)], samples, ranges[0])]
+    fillet = _fillet(shape, move, samples) if move.kind == ARC and smooth[0] and smooth[1 % len(smooth)] else None
+    if fillet is not None:
+        nodes[0], nodes[1], bulge = fillet
+        inner = [[bulge]]
+    else:
+        inner = [inner_unknowns(move.kind, nodes[0], nodes[1 % len(nodes)], samples, ranges[0])]
     inner += [shape.unknowns[shape.extra(k)].tolist() for k in kept]
     return Shape(np.concatenate([*nodes, *map(np.array, inner)]), kinds, lines, smooth, ranges)
+
+
+def _fillet(shape: Shape, move: _Move, samples: Samples) -> tuple[np.ndarray, np.ndarray, float] | None:
+    """Ends and bulge of the arc that is tangent to the lines on both sides and as far from their corner as the
+    boundary.
+    """
+    n = shape.count
+    before, after = (move.first - 1) % n, (move.first + move.count) % n
+    if shape.kinds[before] != LINE or shape.kinds[after] != LINE or before == after:
+        return None
+    a, b = shape.node(before), shape.node(after)
+    u, v = shape.node(before + 1) - a, shape.node(after + 1) - b
+    u, v = u / np.linalg.norm(u), v / np.linalg.norm(v)
+    turn = float(np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v))
+    if not SHARPEST_FILLET < abs(turn) < SPIKE:
+        return None
+    corner = a + u * np.linalg.solve(np.column_stack([u, -v]), b - a)[0]
+    first, last = _span(shape, move.first, move.count, samples.count)
+    inside = samples.points[np.arange(first, last + 1) % samples.count]
+    depth = np.linalg.norm(inside - corner, axis=1).min()
+    radius = depth / (1 / np.cos(turn / 2) - 1)
+    reach = radius * np.tan(abs(turn) / 2)
+    return corner - reach * u, corner + reach * v, float(np.tan(turn / 4))
 
 
 def _both_lines(kinds: tuple[int, ...], i: int) -> bool:
