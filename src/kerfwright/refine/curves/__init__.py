@@ -1,6 +1,7 @@
 """Curves: from a traced boundary to the lines, arcs, circles and cubics of a cut path.
 
-Read in order: samples, snap, candidates, ranges, chain, start, shape, solve, fit.
+Read in order: samples, snap, candidates, prices, ranges, chain, start, shape, solve, search, bumps, relations,
+polish, path, fit.
 """
 
 from kerfwright.refine.curves.fit import fit_curves, fit_cut_path

@@ -27,6 +27,7 @@ __all__ = ["improve", "score"]
 
 MOST_TRIALS = 40
 
+FILLET_REACH = 80.0  # mm that the nodes of a curve may move when it becomes a fillet
 SHARPEST_FILLET = 0.1  # radians between lines below which their corner is nowhere
 LONGEST_SPLIT = 60.0  # mm: longer curves are no corners
 MOST_TURN = 0.7  # radians: a sharp node that turns more is not tried smooth
@@ -93,9 +94,9 @@ def settled(fit: Fit, samples: Samples, guides: list[GuideLine]) -> Fit:
     return solve(_with_ranges(fit.shape, samples), samples, guides)
 
 
-def _with_ranges(shape: Shape, samples: Samples) -> Shape:
+def _with_ranges(shape: Shape, samples: Samples, millimetres: float = 25.0) -> Shape:
     starts = []
-    reach = samples.steps(25.0)
+    reach = samples.steps(millimetres)
     for k, (first, _) in enumerate(shape.ranges):
         window = np.arange(first - reach, first + reach + 1)
         gap = np.linalg.norm(samples.points[window % samples.count] - shape.node(k), axis=1)
@@ -156,7 +157,7 @@ def _merges(fit: Fit, samples: Samples, options: CurveOptions) -> Iterator[_Move
                     paid
                     - fit_range(samples, *_believed(span, shape, first, count, kind), kind)
                     - price * _least(kind)
-                    + price * _allowance(shape, first, count, samples)
+                    + price * _allowance(shape, first, count, kind, samples)
                 )
                 yield _Move(first, count, kind, gain)
 
@@ -204,14 +205,14 @@ def _believed(span: tuple[int, int], shape: Shape, first: int, count: int, kind:
     return span[0] + margin * shape.smooth[first], span[1] - margin * shape.smooth[(first + 1) % shape.count]
 
 
-def _allowance(shape: Shape, first: int, count: int, samples: Samples) -> float:
+def _allowance(shape: Shape, first: int, count: int, kind: int, samples: Samples) -> float:
     """How much a move may look worse than it is, as its nodes stay where they are in the estimate.
 
     The nodes of a short curve or of a cubic between smooth nodes can move far for the size of the edge.
     """
     if count > 1:
         return 4.0
-    if shape.kinds[first] == LINE:
+    if shape.kinds[first] == LINE or kind == CUBIC:
         return 1.0
     start, stop = shape.ranges[first]
     return 6.0 if shape.kinds[first] == CUBIC or (stop - start) * samples.spacing < LONGEST_SPLIT else 1.0
@@ -250,7 +251,8 @@ def _applied(shape: Shape, move: _Move, samples: Samples) -> Shape:
     else:
         inner = [inner_unknowns(move.kind, nodes[0], nodes[1 % len(nodes)], samples, ranges[0])]
     inner += [shape.unknowns[shape.extra(k)].tolist() for k in kept]
-    return Shape(np.concatenate([*nodes, *map(np.array, inner)]), kinds, lines, smooth, ranges)
+    applied = Shape(np.concatenate([*nodes, *map(np.array, inner)]), kinds, lines, smooth, ranges)
+    return applied if fillet is None else _with_ranges(applied, samples, FILLET_REACH)
 
 
 def _fillet(shape: Shape, move: _Move, samples: Samples) -> tuple[np.ndarray, np.ndarray, float] | None:
