@@ -10,7 +10,7 @@ import numpy as np
 
 from kerfwright.capture.images import image_size
 from kerfwright.capture.parsing import capture_error, finite_float, read_lines, whole_number
-from kerfwright.capture.posed import PosedImage, checked_camera
+from kerfwright.capture.posed import LARGEST_NUMBER, PosedImage, checked_camera
 
 __all__ = ["find_bundler", "read_bundler"]
 
@@ -89,8 +89,10 @@ def _image(
 
 
 def _pose(turn: np.ndarray, translation: np.ndarray, path: Path, field: str) -> np.ndarray:
-    if not np.allclose(turn @ turn.T, np.eye(3), atol=TURN_TOLERANCE) or np.linalg.det(turn) < 0:
+    if np.abs(turn).max() > 2 or not np.allclose(turn @ turn.T, np.eye(3), atol=TURN_TOLERANCE) or np.linalg.det(turn) < 0:
         raise capture_error(path, f"{field} rotation", turn.tolist(), "not a rotation: export the file again")
+    if not (np.abs(translation) < LARGEST_NUMBER).all():
+        raise capture_error(path, f"{field} translation", translation.tolist(), "not a pose: export the file again")
     u, _, vt = np.linalg.svd(turn)
     pose = np.eye(4)
     pose[:3, :3] = CAMERA_FROM_BUNDLER @ u @ vt

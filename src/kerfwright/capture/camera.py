@@ -51,6 +51,8 @@ class Camera:
     def distort(self, xy: np.ndarray) -> np.ndarray:
         """(N, 2) ideal to distorted coordinates on the plane z = 1."""
         k1, k2, p1, p2 = self.distortion
+        if not self.distortion.any():
+            return xy
         x, y = xy[:, 0], xy[:, 1]
         r2 = x * x + y * y
         radial = 1 + k1 * r2 + k2 * r2 * r2

@@ -13,7 +13,7 @@ from kerfwright.capture.images import ImageFinder, image_size
 from kerfwright.capture.normals import normals_or_estimates
 from kerfwright.capture.parsing import capture_error
 from kerfwright.capture.ply import read_ply
-from kerfwright.capture.posed import PosedImage
+from kerfwright.capture.posed import LARGEST_NUMBER, PosedImage
 from kerfwright.capture.types import Capture, Cloud, View
 from kerfwright.errors import OptionError
 from kerfwright.model import Scale
@@ -110,7 +110,7 @@ def _cloud(path: Path, views: tuple[View, ...]) -> tuple[Cloud, tuple[str, ...]]
 def _check_points(points: np.ndarray, path: Path) -> None:
     if len(points) < FEWEST_POINTS:
         raise capture_error(path, "points", len(points), f"at least {FEWEST_POINTS} are needed: export the dense cloud")
-    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    bad = np.flatnonzero(~(np.abs(points) < LARGEST_NUMBER).all(axis=1))  # NaN is not either
     if len(bad):
         raise capture_error(
             path,
@@ -118,5 +118,5 @@ def _check_points(points: np.ndarray, path: Path) -> None:
             points[bad[0]],
             f"not a place ({len(bad)} such): remove these points, or export again",
         )
-    if not np.ptp(points, axis=0).max() > 0:
+    if not np.ptp(points, axis=0).max() > 1e-9 * np.abs(points).max():
         raise capture_error(path, "points", points[0], "all are at one place: export the dense cloud")

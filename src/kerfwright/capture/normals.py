@@ -17,7 +17,8 @@ CELL = 3.0  # of the points' spacing: so wide a cell of a depth image is covered
 DEPTH = 1.0  # of the cell's width: how far behind its cell's nearest point a point counts as seen; less than a board
 MOST_VIEWS = 20  # that vote; more cost as much and tell less
 SAMPLE_VIEWS = 8  # asked whether a file's normals point outwards
-SAMPLE = 20_000  # points whose spacing is measured
+SAMPLE = 80_000  # of the points, that are asked
+SPACED = 20_000  # points whose distance to their neighbours is measured
 CLEAR = 0.5  # votes that decide alone: a view squarely in front, or two at a slant
 MOST_INWARD = 0.05  # of the decided normals may face away; a hundredth does in good stereo clouds, about thin edges
 MOST_MISSING = 0.1  # of a file's normals may be zero or NaN: more, and all are estimated
@@ -50,20 +51,26 @@ def normals_or_estimates(
     if missing.any():
         unit[missing] = estimated_normals(points, views)[missing]
         notes = (f"{missing.sum()} normals of the cloud are zero or NaN: these were estimated",)
-    spacing = _spacing(points)
-    some = facing_votes(points, unit, views, spacing, SAMPLE_VIEWS)
-    share = float((some < -CLEAR).sum() / max(1, (np.abs(some) > CLEAR).sum()))
+    thin = slice(None, None, max(1, len(points) // SAMPLE))
+    share = _inward_share(points[thin], unit[thin], views)
     if share <= MOST_INWARD:
         return unit, notes
     note = (
         f"{100 * share:.0f} % of the cloud's normals faced away from the cameras that see them: such were turned round"
     )
-    return turned_outwards(unit, facing_votes(points, unit, views, spacing) + CLEAR), (*notes, note)
+    votes = facing_votes(points, unit, views, _spacing(points))
+    return turned_outwards(unit, votes + CLEAR), (*notes, note)
+
+
+def _inward_share(points: np.ndarray, normals: np.ndarray, views: Sequence[View]) -> float:
+    """Share of the normals, of those that the views decide, that point into the material."""
+    votes = facing_votes(points, normals, views, _spacing(points), SAMPLE_VIEWS)
+    return float((votes < -CLEAR).sum() / max(1, (np.abs(votes) > CLEAR).sum()))
 
 
 def _spacing(points: np.ndarray) -> float:
     """Median distance to the third nearest point."""
-    some = points[:: max(1, len(points) // SAMPLE)]
+    some = points[:: max(1, len(points) // SPACED)]
     return float(np.median(cKDTree(points).query(some, k=min(4, len(points)))[0][:, -1]))
 
 

@@ -12,8 +12,9 @@ from scipy.spatial.transform import Rotation
 from kerfwright.capture.camera import CAMERA_MODELS, Camera
 from kerfwright.capture.parsing import capture_error
 
-__all__ = ["PosedImage", "checked_camera", "pose_matrix"]
+__all__ = ["LARGEST_NUMBER", "PosedImage", "checked_camera", "pose_matrix"]
 
+LARGEST_NUMBER = 1e12  # of a pose or a place, any unit: squares of it are exact enough, and nothing real comes near
 LARGEST_SIDE = 1_000_000  # pixels; far above any sensor or panorama, far below what a damaged file claims
 
 
@@ -60,11 +61,11 @@ def pose_matrix(quaternion: np.ndarray, translation: np.ndarray, path: Path, fie
     Raises
     ------
     CaptureError
-        If a number is not finite or the quaternion is zero.
+        If a number is NaN or absurdly large, or the quaternion is zero.
     """
-    if not (np.isfinite(quaternion).all() and np.isfinite(translation).all()):
+    if not (np.abs([*quaternion, *translation]) < LARGEST_NUMBER).all():  # NaN is not either
         raise capture_error(
-            path, field, [*quaternion, *translation], "finite numbers belong here: export the file again"
+            path, field, [*quaternion, *translation], "not a pose: export the file again"
         )
     if np.linalg.norm(quaternion) < 1e-6:
         raise capture_error(path, f"{field} quaternion", quaternion, "its length must be 1: export the file again")
