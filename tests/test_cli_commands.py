@@ -76,9 +76,46 @@ def test_export_is_forbidden_by_an_error_unless_forced(kerfwright, overlapping, 
     assert forced.returncode == 0 and "NOT VERIFIED" in (tmp_path / "out" / "model.step").read_text()
 
 
+def test_options_reach_the_checker(kerfwright, sound):
+    assert "K206" in kerfwright("check", sound, "--sheet", "90x40").stdout
+    assert "K206" not in kerfwright("check", sound.parent, "--sheet", "4x2in").stdout  # a folder of results will do
+
+
+def test_options_reach_the_exporters(kerfwright, sound, tmp_path):
+    done = kerfwright("export", sound, "dxf", "cutlist", "-o", tmp_path / "out", "--units", "in", "--layers", "depth")
+    assert done.returncode == 0, done.stderr
+    assert "OUTSIDE_0.787IN" in (tmp_path / "out" / "parts" / "a.dxf").read_text()
+    assert '25/32"' in (tmp_path / "out" / "cutlist.md").read_text()
+    kerf = kerfwright("export", sound, "dxf", "-o", tmp_path / "kerf", "--kerf", "1/8in")
+    assert kerf.returncode == 0 and "OUTSIDE_KERF" in (tmp_path / "kerf" / "parts" / "a.dxf").read_text()
+
+
+def test_all_formats_at_once(kerfwright, sound, tmp_path):
+    done = kerfwright("export", sound, "all", "-o", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert {"model.step", "model.brep", "cutlist.csv", "model_cadquery.py"} <= {
+        p.name for p in (tmp_path / "out").iterdir()
+    }
+
+
+def test_a_faulty_model_is_checked_and_not_exported(kerfwright, tmp_path):
+    bad = board("a", 0).model_copy(update={"thickness": Quantity(value=0)})
+    model = Model(name="bad", boards=(bad, board("b/c", 300), board("d", 600))).model_dump_json()
+    (tmp_path / "model.json").write_text(model)
+    done = kerfwright("check", tmp_path / "model.json")
+    assert done.returncode == 1 and done.stdout.startswith("K101 error") and "K103 error" in done.stdout
+    refused = kerfwright("export", tmp_path / "model.json", "step", "-o", tmp_path / "out", "--force")
+    assert refused.returncode == 2 and refused.stderr.count("\n") == 1 and not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
+        (("export", "{}/model.json", "dxf", "-o", "{}/out", "--kerf", "wide"), ["--kerf: 'wide'", "1/4in"]),
+        (("export", "{}/model.json", "dxf", "-o", "{}/out", "--units", "cm"), ["units: 'cm'", "mm or in"]),
+        (("export", "{}/model.json", "sheets", "-o", "{}/out", "--sheet", "90x90"), ["'a'", "does not fit"]),
+        (("export", "{}/model.json", "dxf", "-o", "{}/out", "--tool", "0"), ["tool_diameter: 0"]),
+        (("check", "{}/model.json", "--saw", "-1"), ["bevel: -1"]),
         (("check", "{}/none.json"), ["none.json"]),
         (("export", "{}/model.json", "stl5", "-o", "{}/out"), ["stl5", "step"]),
         (("export", "{}/none.json", "step", "-o", "{}/out"), ["none.json"]),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from build123d import Edge, Face, Keep, Plane, Solid, Vector, Wire, split
+from build123d import Edge, Face, Keep, Plane, Shell, Solid, Vector, Wire, split
 from OCP.BRep import BRep_Tool
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge
 from OCP.GeomConvert import GeomConvert
@@ -77,19 +77,24 @@ def wire(start, segments, at) -> Wire:
     return Wire(edges)
 
 
-def board(sheet, size, drawn, outline, holes=(), lies_on=()) -> Solid:
+def board(sheet, size, drawn, outline, holes=(), lies_on=(), bevels=()) -> Solid:
     """Cut a board.
 
     sheet: where its faces are; size: its length and width; drawn: the length and width that the outline is drawn in;
-    outline, holes: a starting point and the segments from there; lies_on: faces that it ends on, looking towards it.
+    outline, holes: a starting point and the segments from there; lies_on: faces that it ends on, looking towards it;
+    bevels: bodies to take away, each given by the corners of its faces.
     """
 
     def at(point):
-        return Vector(point[0] * size[0] / drawn[0], point[1] * size[1] / drawn[1])
+        return Vector(point[0] * size[0] / drawn[0], point[1] * size[1] / drawn[1], *point[2:])
 
     face = Face(wire(*outline, at), [wire(*hole, at) for hole in holes])
     place = Plane(sheet.origin - sheet.normal * (sheet.below * sheet.thickness), x_dir=sheet.x, z_dir=sheet.normal)
-    solid = Solid.extrude(face, Vector(0, 0, sheet.thickness)).moved(place.location)
+    solid = Solid.extrude(face, Vector(0, 0, sheet.thickness))
+    for corners in bevels:
+        rings = [Wire.make_polygon([at(p) for p in ring], close=True) for ring in corners]
+        solid = solid.cut(Solid(Shell([Face(ring) for ring in rings]))).solid()
+    solid = solid.moved(place.location)
     for plane in lies_on:
         solid = split(solid, bisect_by=plane, keep=Keep.TOP).solid()
     return solid.clean()

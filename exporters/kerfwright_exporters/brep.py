@@ -10,6 +10,7 @@ from kerfwright.model.io import write_bytes
 from kerfwright.solid import assembly_solids
 from kerfwright_exporters.naming import STAMP
 from kerfwright_exporters.options import ExportOptions
+from kerfwright_exporters.steady import without_noise
 
 __all__ = ["export"]
 
@@ -37,8 +38,8 @@ def export(model: Model, out_dir: Path, options: ExportOptions) -> list[Path]:
     try:
         if not BRepTools.Write_s(compound, str(beside)):
             raise ExportError(f"{path}: OCCT could not write it: check that the folder can be written")
-        data = beside.read_bytes()
+        text = beside.read_text(encoding="ascii")
     finally:
         beside.unlink(missing_ok=True)
-    write_bytes(path, data)
+    write_bytes(path, without_noise(text, "0").encode("ascii"))
     return [path]

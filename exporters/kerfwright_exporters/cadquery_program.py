@@ -13,7 +13,7 @@ from kerfwright.model.frames import board_from_model, model_from_board, transfor
 from kerfwright.model.io import write_bytes
 from kerfwright.solid.bevels import bevel_bodies, polyhedron_faces
 from kerfwright.solid.faces import plane_axes
-from kerfwright_exporters.naming import STAMP, ascii_name, board_colours, title
+from kerfwright_exporters.naming import STAMP, ascii_labels, ascii_name, board_colours, plain_name, title
 from kerfwright_exporters.options import ExportOptions
 from kerfwright_exporters.script import identifiers, number
 
@@ -93,15 +93,18 @@ def _program(model: Model, options: ExportOptions) -> Iterator[str]:
     yield _LIBRARY.rstrip()
     for board, name in zip(model.boards, names, strict=True):
         yield from _function(board, name)
+    yield "\n\nNAMES = (" + " ".join(f'"{label}",' for label in ascii_labels(model)) + ")"
     yield "\n\ndef assembly():"
     yield '    """All boards where their contacts hold them."""'
     yield f'    found = cq.Assembly(name="{ascii_name(model.name)}")'
     for board, name, rgb in zip(model.boards, names, board_colours(model), strict=True):
-        yield f'    found.add({name}(), name="{ascii_name(board.name)}", loc={_place(board)}, color=cq.Color{rgb})'
-    yield from (f'    found.constrain("{ascii_name(name)}", "Fixed")' for name in _fixed(model))
-    boards = {board.name: board for board in model.boards}
+        yield f'    found.add({name}(), name="{name}", loc={_place(board)}, color=cq.Color{rgb})'
+    boards = {board.name: (board, name) for board, name in zip(model.boards, names, strict=True)}
+    yield from (f'    found.constrain("{boards[name][1]}", "Fixed")' for name in _fixed(model))
     yield from (line for contact in model.contacts for line in _touch(contact, boards))
     yield from (["    found.solve()"] if model.contacts else [])
+    yield "    for child, name in zip(found.children, NAMES):  # not before: constraints take plain letters only"
+    yield "        child.name = name"
     yield "    return found"
     yield '\n\nif __name__ == "__main__":'
     yield '    assembly().export("model_from_cadquery.step")'
@@ -118,7 +121,7 @@ def _fixed(model: Model) -> list[str]:
 
 def _function(board: Board, name: str) -> Iterator[str]:
     yield f"\n\ndef {name}():"
-    yield f'    """{ascii_name(board.name)}."""'
+    yield f'    """{plain_name(board.name)}."""'
     yield f"    outline = {_loop(board.cut_path.outer)}"
     yield f"    holes = [{', '.join(_loop(hole) for hole in board.cut_path.holes)}]"
     yield "    bevels = ["
@@ -158,16 +161,16 @@ def _place(board: Board) -> str:
     return f"place({_point(pose[:3, 3])}, {_exact(pose[:3, 0])}, {_exact(pose[:3, 2])})"
 
 
-def _touch(contact: Contact, boards: dict[str, Board]) -> Iterator[str]:
+def _touch(contact: Contact, boards: dict[str, tuple[Board, str]]) -> Iterator[str]:
     """The contact in both boards' own frames: a point, the face's outward normal, a direction along it."""
     normal = np.array(contact.normal) / np.linalg.norm(contact.normal)
     along = plane_axes(normal)[0]
     sides = []
     for name, outward in ((contact.a, normal), (contact.b, -normal)):
-        pose = board_from_model(boards[name])
+        pose = board_from_model(boards[name][0])
         vectors = (transform_vectors(pose, v) for v in (outward, along))
         sides.append(f"({_point(transform_points(pose, contact.point))}, {', '.join(map(_exact, vectors))})")
     yield "    touch("
-    yield f'        found, "{ascii_name(contact.a)}", "{ascii_name(contact.b)}",'
+    yield f'        found, "{boards[contact.a][1]}", "{boards[contact.b][1]}",'
     yield from (f"        {side}," for side in sides)
     yield "    )"

@@ -13,7 +13,7 @@ import numpy as np
 from kerfwright.model import Board, Model
 from kerfwright.model.geometry import path_area, sample_loop
 from kerfwright.model.io import write_bytes
-from kerfwright_exporters.naming import STAMP, ascii_name, title
+from kerfwright_exporters.naming import STAMP, plain_name, title
 from kerfwright_exporters.options import ExportOptions
 
 __all__ = ["Row", "cut_rows", "export", "length_text"]
@@ -64,8 +64,8 @@ def _row(boards: list[Board], options: ExportOptions) -> Row:
     width, length = sorted(np.ptp(sample_loop(first.cut_path.outer), axis=0))
     stock = first.stock or f"sheet {length_text(first.thickness.value, options)}"
     return Row(
-        name=ascii_name(first.name),
-        boards=tuple(ascii_name(board.name) for board in boards),
+        name=plain_name(first.name),
+        boards=tuple(plain_name(board.name) for board in boards),
         length=float(length),
         width=float(width),
         thickness=first.thickness.value,

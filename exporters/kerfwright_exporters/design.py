@@ -3,7 +3,8 @@
 A board's sheet keeps one reference plane (a face on the object's border, a face that lies on another board's sheet,
 or the middle where its end is pointed) and grows from there with its stock. Where its outline ends on another
 board's sheet or on the floor, the outline is drawn over and cut off at that face, so that length and bevel follow from
-the neighbour. Everything else is stretched with the object's width, depth and height.
+the neighbour. A bevel whose plane would cut off more than the bevel does is kept as the body that it takes away.
+Everything else is stretched with the object's width, depth and height.
 """
 
 from __future__ import annotations
@@ -14,13 +15,14 @@ import numpy as np
 
 from kerfwright.model import Board, Contact, Edge, Line, Loop, Model
 from kerfwright.model.frames import model_from_board, transform_points, transform_vectors
-from kerfwright.model.geometry import edge_length, edge_start, edge_tangents, sample_edge, sample_loop, transform_loop
+from kerfwright.model.geometry import edge_length, edge_start, edge_tangents, sample_loop, transform_loop
 from kerfwright.solid import assembly_solids
-from kerfwright.solid.faces import shape_of
+from kerfwright.solid.bevels import HalfSpace, bevel_bodies, polyhedron_faces
+from kerfwright.solid.faces import Shape, shape_of
 
 __all__ = ["BoardDesign", "FreeCut", "NeighbourCut", "design_boards", "model_box"]
 
-ON_PLANE = 0.05  # mm between an outline's edge and the face that it ends on
+ON_PLANE = 0.01  # mm between an outline's edge and the face that it ends on: what counts as snug
 OVERDRAW = 30.0  # mm that an outline is drawn over a face that will cut it
 PARALLEL = 1e-3  # rad between an edge and a plane along it
 
@@ -54,12 +56,21 @@ class BoardDesign:
     outline: Loop
     holes: tuple[Loop, ...]
     cuts: tuple[NeighbourCut | FreeCut, ...]
+    bodies: tuple[tuple[np.ndarray, ...], ...] = ()  # faces (N, 3) of what other bevels take off, z from the bottom
     rests_on: NeighbourCut | None = None  # face that its sheet lies on
 
 
 def model_box(model: Model) -> np.ndarray:
     """Lowest and highest corner (2, 3) of the object, mm."""
-    boxes = np.stack([shape_of(name, solid).box for name, solid in assembly_solids(model)])
+    return _box(_shapes(model))
+
+
+def _shapes(model: Model) -> list[Shape]:
+    return [shape_of(name, solid) for name, solid in assembly_solids(model)]
+
+
+def _box(shapes: list[Shape]) -> np.ndarray:
+    boxes = np.stack([shape.box for shape in shapes])
     return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
 
@@ -72,29 +83,30 @@ def _corners(board: Board) -> np.ndarray:
 
 def design_boards(model: Model) -> list[BoardDesign]:
     """The design of every board, in the model's order."""
-    box = model_box(model)
-    return [_design(model, k, box) for k in range(len(model.boards))]
+    shapes = _shapes(model)
+    return [_design(model, k, shapes[k].points, _box(shapes)) for k in range(len(model.boards))]
 
 
-def _design(model: Model, index: int, box: np.ndarray) -> BoardDesign:
+def _design(model: Model, index: int, solid: np.ndarray, box: np.ndarray) -> BoardDesign:
     board = model.boards[index]
     pose = model_from_board(board)
     flat = sample_loop(board.cut_path.outer)
     centre, size = (flat.min(axis=0) + flat.max(axis=0)) / 2, np.ptp(flat, axis=0)
     rests_on, face = _rests(model, index)
     below = face if face is not None else _reference(board, box)
-    origin = transform_points(pose, [*centre, below * board.thickness.value])
-    cuts, edges = _cuts(model, index)
+    cuts = _Cuts(board, solid)
+    cuts.take(model, index)
     return BoardDesign(
         board=board,
-        origin=origin,
+        origin=transform_points(pose, [*centre, below * board.thickness.value]),
         x=pose[:3, 0],
         y=pose[:3, 1],
         below=below,
         size=(float(size[0]), float(size[1])),
-        outline=_centred(_overdrawn(board.cut_path.outer, edges), centre),
+        outline=_centred(_overdrawn(board.cut_path.outer, cuts.edges), centre),
         holes=tuple(_centred(hole, centre) for hole in board.cut_path.holes),
-        cuts=tuple(cuts),
+        cuts=tuple(cuts.found),
+        bodies=tuple(tuple(f - [*centre, 0] for f in body) for body in cuts.bodies()),
         rests_on=rests_on,
     )
 
@@ -132,23 +144,50 @@ def _rests(model: Model, index: int) -> tuple[NeighbourCut | None, float | None]
     return None, None
 
 
-def _cuts(model: Model, index: int) -> tuple[list[NeighbourCut | FreeCut], set[int]]:
-    """What cuts the board off, and the edges of its outline that are drawn over for it."""
-    board = model.boards[index]
-    names = [b.name for b in model.boards]
-    cuts: list[NeighbourCut | FreeCut] = []
-    edges: set[int] = set()
-    planes: list[tuple[np.ndarray, np.ndarray]] = []
-    for contact in model.contacts:
-        other = _sheet_of(contact, board.name)
-        if other is None:
-            continue
-        name, face, normal = other
-        _try_cut(board, np.array(contact.point), normal, NeighbourCut(names.index(name), face), cuts, edges, planes)
-    for point, normal in _own_planes(board):
-        if not any(abs(normal @ n) > 1 - PARALLEL and abs((point - p) @ n) < ON_PLANE for p, n in planes):
-            _try_cut(board, point, normal, FreeCut(point, normal), cuts, edges, planes)
-    return cuts, edges
+class _Cuts:
+    """What cuts a board off, and the edges of its outline that are drawn over for it."""
+
+    def __init__(self, board: Board, solid: np.ndarray) -> None:
+        self.board, self.solid = board, solid  # the board's solid lies in the hull of these points (N, 3), model frame
+        self.found: list[NeighbourCut | FreeCut] = []
+        self.edges: set[int] = set()
+        self.planes: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def take(self, model: Model, index: int) -> None:
+        """The neighbours' faces first, then planes of the board's own bevels that no neighbour has."""
+        names = [board.name for board in model.boards]
+        for contact in model.contacts:
+            if other := _sheet_of(contact, self.board.name):
+                name, face, normal = other
+                self._try(np.array(contact.point), normal, NeighbourCut(names.index(name), face))
+        for point, normal in _own_planes(self.board):
+            if not self._has(point, normal):
+                self._try(point, normal, FreeCut(point, normal))
+
+    def _has(self, point: np.ndarray, normal: np.ndarray) -> bool:
+        return any(abs(normal @ n) > 1 - PARALLEL**2 and abs((point - p) @ n) < ON_PLANE for p, n in self.planes)
+
+    def _try(self, point: np.ndarray, normal: np.ndarray, cut: NeighbourCut | FreeCut) -> None:
+        """Take the cut if the board ends on that plane along a straight edge, and no part of it lies beyond."""
+        found = _edges_on(self.board, point, normal)
+        if found and ((self.solid - point) @ normal).min() >= -ON_PLANE:
+            self.found.append(cut)
+            self.edges |= found
+            self.planes.append((point, normal))
+
+    def bodies(self) -> list[list[np.ndarray]]:
+        """Faces, board frame, of what the bevels take off whose planes are not among the cuts."""
+        planes = zip(self.board.bevels, _own_planes(self.board), strict=True)
+        rest = tuple(bevel for bevel, plane in planes if not self._has(*plane))
+        if not rest:
+            return []
+        bodies = bevel_bodies(self.board.model_copy(update={"bevels": rest}))
+        return [polyhedron_faces([_taller(h) for h in body]) for body in bodies]
+
+
+def _taller(space: HalfSpace) -> HalfSpace:
+    """A half-space that keeps to the board's sheet let out, so that its body cuts thicker stock as well."""
+    return HalfSpace(space.normal, space.offset - OVERDRAW) if abs(space.normal[2]) == 1 else space
 
 
 def _sheet_of(contact: Contact, name: str) -> tuple[str, str, np.ndarray] | None:
@@ -171,23 +210,6 @@ def _own_planes(board: Board) -> list[tuple[np.ndarray, np.ndarray]]:
     ]
 
 
-def _try_cut(
-    board: Board,
-    point: np.ndarray,
-    normal: np.ndarray,
-    cut: NeighbourCut | FreeCut,
-    cuts: list,
-    edges: set[int],
-    planes: list,
-) -> None:
-    """Take the cut if the board ends on that plane along a straight edge, and no part of the board lies beyond it."""
-    found = _edges_on(board, point, normal)
-    if found and _all_ahead(board, point, normal, found):
-        cuts.append(cut)
-        edges |= found
-        planes.append((point, normal))
-
-
 def _edges_on(board: Board, point: np.ndarray, normal: np.ndarray) -> set[int]:
     """Straight edges of the outline that the plane runs along, within the thickness."""
     pose = model_from_board(board)
@@ -204,18 +226,6 @@ def _edges_on(board: Board, point: np.ndarray, normal: np.ndarray) -> set[int]:
         if abs(n[:2] @ along) < PARALLEL and -(n[:2] @ outward) > 0.2 and reached:
             found.add(k)
     return found
-
-
-def _all_ahead(board: Board, point: np.ndarray, normal: np.ndarray, found: set[int]) -> bool:
-    """Whether only what a bevel takes off lies behind the plane, so that it may cut the whole board."""
-    edges = board.cut_path.outer.edges
-    beside = {(k + step) % len(edges) for k in found for step in (-1, 0, 1)}
-    rest = [sample_edge(edge) for k, edge in enumerate(edges) if k not in beside]
-    if not rest:
-        return True
-    pose, flat = model_from_board(board), np.concatenate(rest)
-    solid = np.concatenate([np.column_stack([flat, np.full(len(flat), z)]) for z in (0.0, board.thickness.value)])
-    return bool(((transform_points(pose, solid) - point) @ normal).min() >= -ON_PLANE)
 
 
 def _overdrawn(loop: Loop, over: set[int]) -> Loop:

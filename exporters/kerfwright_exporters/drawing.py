@@ -14,7 +14,7 @@ import numpy as np
 from kerfwright.model import Board, CutPath, Loop
 from kerfwright.model.arcs import arc_path
 from kerfwright.model.geometry import path_polygon, transform_loop
-from kerfwright_exporters.naming import STAMP, ascii_name
+from kerfwright_exporters.naming import STAMP, plain_name
 from kerfwright_exporters.offset import offset_loop
 from kerfwright_exporters.options import ExportOptions
 from kerfwright_exporters.relief import relieved_path
@@ -91,7 +91,7 @@ def _tool_path(cut: Cut, distance: float, name: str) -> Cut:
 
 def _texts(board: Board, path: CutPath, bevels: tuple[BevelLine, ...], options: ExportOptions) -> Iterator[Text]:
     polygon = path_polygon(path, 0.1)
-    lines = [ascii_name(board.name), *([STAMP] if options.unverified else [])]
+    lines = [plain_name(board.name), *([STAMP] if options.unverified else [])]
     (x, y), size = _room(polygon, lines)
     for row, (operation, text) in enumerate(zip(("label", "stamp"), lines, strict=False)):
         yield Text(operation, text, (x, y + (0.75 * (len(lines) - 1) - 1.5 * row) * size), size)

@@ -17,8 +17,9 @@ from kerfwright.model import Model
 from kerfwright.model.frames import model_from_board
 from kerfwright.model.io import write_bytes
 from kerfwright.solid import board_solid
-from kerfwright_exporters.naming import ascii_name, board_colours, title
+from kerfwright_exporters.naming import board_colours, plain_name, title
 from kerfwright_exporters.options import ExportOptions
+from kerfwright_exporters.steady import NOISE
 
 if TYPE_CHECKING:
     import build123d
@@ -37,9 +38,9 @@ def export(model: Model, out_dir: Path, options: ExportOptions) -> list[Path]:
         points, normals, triangles = _mesh(board_solid(board), options.mesh_tolerance)
         accessors = [_add(document, buffer, data) for data in (points, normals, triangles)]
         document["materials"].append(_material(rgb))
-        document["meshes"].append(_primitive(ascii_name(board.name), accessors, index))
+        document["meshes"].append(_primitive(plain_name(board.name), accessors, index))
         pose = model_from_board(board).T.ravel().tolist()  # glTF keeps matrices by column
-        document["nodes"].append({"name": ascii_name(board.name), "mesh": index, "matrix": pose})
+        document["nodes"].append({"name": plain_name(board.name), "mesh": index, "matrix": pose})
     document["buffers"] = [{"byteLength": len(buffer)}]
     write_bytes(path, _container(document, bytes(buffer)))
     return [path]
@@ -70,8 +71,8 @@ def _mesh(solid: build123d.Solid, tolerance: float) -> tuple[np.ndarray, np.ndar
     BRepMesh_IncrementalMesh(solid.wrapped, tolerance, False, 0.2)  # not relative to the edges' sizes
     parts = [_face(face) for face in solid.faces()]
     shifts = np.cumsum([0, *(len(p) for p, _, _ in parts)])[:-1]
-    points = np.concatenate([p for p, _, _ in parts]).astype(np.float32)
-    normals = np.concatenate([n for _, n, _ in parts]).astype(np.float32)
+    points, normals = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+    points, normals = (np.where(np.abs(x) < NOISE, 0.0, x).astype(np.float32) for x in (points, normals))
     triangles = np.concatenate([t + s for (_, _, t), s in zip(parts, shifts, strict=True)]).astype(np.uint32)
     return points, normals, triangles
 

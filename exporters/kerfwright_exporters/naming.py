@@ -7,7 +7,7 @@ import unicodedata
 
 from kerfwright.model import Model
 
-__all__ = ["STAMP", "ascii_name", "board_colours", "file_stems", "title"]
+__all__ = ["STAMP", "ascii_labels", "ascii_name", "board_colours", "file_stems", "plain_name", "title"]
 
 STAMP = "NOT VERIFIED"
 
@@ -19,8 +19,15 @@ _PALETTE = (
 )  # fmt: skip
 
 
+def plain_name(name: str) -> str:
+    """The name without what could mean something to a program that reads it: letters of any script, digits, _ . -."""
+    composed = unicodedata.normalize("NFC", name)
+    kept = (c if unicodedata.category(c)[0] in "LMN" or c in " _.-" else "_" for c in composed)
+    return re.sub("_+", "_", "".join(kept)).strip(" .")[:100] or "board"
+
+
 def ascii_name(name: str) -> str:
-    """The name in letters that STEP labels, DXF layers and any file system take; never empty."""
+    """The name in letters that any file system and controller takes; never empty."""
     plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
     return re.sub(r"[^A-Za-z0-9 _.-]+", "_", plain).strip(" .")[:100] or "board"
 
@@ -40,6 +47,12 @@ def file_stems(model: Model) -> list[str]:
     return stems
 
 
+def ascii_labels(model: Model) -> list[str]:
+    """Every board's name where it is ASCII, else its file's: for programs that garble other letters."""
+    plain = [plain_name(board.name) for board in model.boards]
+    return [name if name.isascii() else stem for name, stem in zip(plain, file_stems(model), strict=True)]
+
+
 def board_colours(model: Model) -> list[tuple[float, float, float]]:
     """Red, green, blue from 0 to 1 for every board."""
     return [_PALETTE[k % len(_PALETTE)] for k in range(len(model.boards))]
@@ -47,5 +60,5 @@ def board_colours(model: Model) -> list[tuple[float, float, float]]:
 
 def title(model: Model, unverified: bool) -> str:
     """The model's name as files carry it."""
-    name = ascii_name(model.name)
+    name = plain_name(model.name)
     return f"{name} {STAMP}" if unverified else name

@@ -10,7 +10,7 @@ import numpy as np
 from kerfwright.model import Model
 from kerfwright.model.geometry import sample_loop
 from kerfwright_exporters.cutlist import length_text
-from kerfwright_exporters.naming import STAMP, title
+from kerfwright_exporters.naming import STAMP, ascii_name, title
 from kerfwright_exporters.options import ExportOptions
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def _page(canvas: Any, model: Model, sheet: Sheet, options: ExportOptions) -> No
 
     scale = _scale(sheet)
     canvas.setFont("Helvetica-Bold", 4.5)
-    canvas.drawString(BORDER, PAGE[1] - BORDER, title(model, False))
+    canvas.drawString(BORDER, PAGE[1] - BORDER, _shown(title(model, False), ascii_name(model.name)))
     canvas.setFont("Helvetica", 3.5)
     canvas.drawString(BORDER, PAGE[1] - BORDER - 6, f"{caption(sheet, options)}. Scale 1:{scale}. Grain runs across.")
     if options.unverified:
@@ -98,13 +98,22 @@ def _label(canvas: Any, board: LaidBoard, text: Any, scale: int, options: Export
     size = " x ".join(length_text(v, options) for v in board.size)
     height = float(np.clip(0.35 * min(board.size) / scale, 1.2, 3.0))
     length = max(board.size) / scale
-    height = min(height, max(0.8, 1.6 * length / max(len(size), len(board.name))))
+    height = min(height, max(0.8, 1.6 * length / max(len(size), len(_shown(board.name, board.stem)))))
     turn = text.turn if board.size[0] >= board.size[1] else text.turn + np.pi / 2
     if np.cos(turn) < -1e-6 or np.sin(turn) < -0.999:  # never upside down
         turn += np.pi
     up = np.array([-np.sin(turn), np.cos(turn)])
-    _text(canvas, board.name, at + 0.65 * height * up, height, turn)
+    _text(canvas, _shown(board.name, board.stem), at + 0.65 * height * up, height, turn)
     _text(canvas, size, at - 0.65 * height * up, 0.85 * height, turn)
+
+
+def _shown(name: str, otherwise: str) -> str:
+    """The name, if the fonts that every PDF reader has can show it."""
+    try:
+        name.encode("cp1252")
+    except UnicodeEncodeError:
+        return otherwise
+    return name
 
 
 def _text(canvas: Any, text: str, at: np.ndarray, height: float, turn: float) -> None:

@@ -14,7 +14,7 @@ from kerfwright.errors import ExportError
 from kerfwright.model import Arc, Bezier, Circle, Edge, Loop, Model
 from kerfwright.model.io import write_bytes
 from kerfwright_exporters.design import BoardDesign, NeighbourCut, design_boards, model_box
-from kerfwright_exporters.naming import STAMP, ascii_name, file_stems, title
+from kerfwright_exporters.naming import STAMP, ascii_labels, ascii_name, file_stems, plain_name, title
 from kerfwright_exporters.options import ExportOptions
 
 __all__ = ["export", "identifiers", "number"]
@@ -57,7 +57,7 @@ def _library() -> str:
     body = source.split("# --- begin ---\n", 1)[1].split("# --- end ---", 1)[0].rstrip()
     head = (
         "from dataclasses import dataclass\n\n"
-        "from build123d import Compound, Edge, Face, Keep, Plane, Solid, Vector, Wire, export_step, split\n"
+        "from build123d import Compound, Edge, Face, Keep, Plane, Shell, Solid, Vector, Wire, export_step, split\n"
         "from OCP.BRep import BRep_Tool\n"
         "from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge\n"
         "from OCP.GeomConvert import GeomConvert\n\n\n"
@@ -144,13 +144,27 @@ def _function(design: BoardDesign, name: str, names: list[str]) -> Iterator[str]
     ends = dict.fromkeys(names[c.board] for c in design.cuts if isinstance(c, NeighbourCut))
     said = f", which ends on {', '.join(ends)}" if ends else ""
     yield f"\n\ndef {name}(length={constant}_LENGTH, width={constant}_WIDTH):"
-    yield f'    """{ascii_name(design.board.name)}{said}."""'
+    yield f'    """{plain_name(design.board.name)}{said}."""'
     yield "    outline = " + _loop(design.outline)
     yield "    holes = [" + ", ".join(_loop(hole) for hole in design.holes) + "]"
     yield "    lies_on = ["
     yield from (f"        {_cut(cut, names)}," for cut in design.cuts)
     yield "    ]"
-    yield f"    return board({constant}, (length, width), {_point(design.size)}, outline, holes, lies_on)"
+    yield from _bodies(design)
+    bevels = ", bevels" if design.bodies else ""
+    yield f"    return board({constant}, (length, width), {_point(design.size)}, outline, holes, lies_on{bevels})"
+
+
+def _bodies(design: BoardDesign) -> Iterator[str]:
+    """What bevels take off that cut only a part of the board's breadth."""
+    if not design.bodies:
+        return
+    yield "    bevels = ["
+    for body in design.bodies:
+        yield "        ["
+        yield from (f"            [{', '.join(_point(p) for p in face)}]," for face in body)
+        yield "        ],"
+    yield "    ]"
 
 
 def _cut(cut: object, names: list[str]) -> str:
@@ -183,8 +197,8 @@ def _assembly(model: Model, names: list[str]) -> Iterator[str]:
     yield "\n\ndef assembly():"
     yield '    """All boards, named."""'
     yield "    boards = {"
-    for board, name in zip(model.boards, names, strict=True):
-        yield f'        "{ascii_name(board.name)}": {name}(),'
+    for label, name in zip(ascii_labels(model), names, strict=True):
+        yield f'        "{label}": {name}(),'
     yield "    }"
     yield "    for name, solid in boards.items():"
     yield "        solid.label = name"

@@ -20,7 +20,7 @@ from kerfwright_exporters.cutlist import length_text
 from kerfwright_exporters.drawing import Drawing, Text, board_drawing, cutting_path, moved_drawing
 from kerfwright_exporters.dxf import add_drawing, dxf_bytes, new_document
 from kerfwright_exporters.layers import layer_colour, layer_name
-from kerfwright_exporters.naming import ascii_name
+from kerfwright_exporters.naming import file_stems, plain_name
 from kerfwright_exporters.nesting import NestOptions, Place, nest
 from kerfwright_exporters.options import ExportOptions
 from kerfwright_exporters.svg import drawing_elements, svg_document
@@ -36,6 +36,7 @@ class LaidBoard:
     """A board on a sheet: its drawing in the sheet's frame, its size in its own."""
 
     name: str
+    stem: str  # of its own files
     drawing: Drawing
     size: tuple[float, float]
     area: float
@@ -91,14 +92,14 @@ def lay_sheets(model: Model, options: ExportOptions) -> list[Sheet]:
 
 
 def _sheets_of(model: Model, numbers: list[int], thickness: float, options: ExportOptions) -> list[Sheet]:
-    boards = [model.boards[k] for k in numbers]
+    boards, stems = [model.boards[k] for k in numbers], [file_stems(model)[k] for k in numbers]
     outlines = [path_polygon(cutting_path(board, options)) for board in boards]
     places = _nested(outlines, [board.name for board in boards], options)
     laid: dict[int, list[LaidBoard]] = {}
-    for board, outline, place in zip(boards, outlines, places, strict=True):
+    for board, stem, outline, place in zip(boards, stems, outlines, places, strict=True):
         drawing = moved_drawing(board_drawing(board, options), _matrix(place, options.sheet_margin))
         size = tuple(float(x) for x in np.ptp(np.array(outline.exterior.coords), axis=0))
-        laid.setdefault(place.sheet, []).append(LaidBoard(ascii_name(board.name), drawing, size, outline.area))
+        laid.setdefault(place.sheet, []).append(LaidBoard(plain_name(board.name), stem, drawing, size, outline.area))
     stock = f"{thickness:.1f}mm"
     return [
         Sheet(f"{stock}-{k + 1}", thickness, options.sheet_length, options.sheet_width, tuple(laid[k]))

@@ -13,8 +13,9 @@ from kerfwright.model.frames import model_from_board
 from kerfwright.model.io import write_bytes
 from kerfwright.solid import board_solid
 from kerfwright.solid.build import location
-from kerfwright_exporters.naming import ascii_name, board_colours, title
+from kerfwright_exporters.naming import board_colours, plain_name, title
 from kerfwright_exporters.options import ExportOptions
+from kerfwright_exporters.steady import without_noise, wrapped_records
 
 __all__ = ["assembly_document", "export", "export_ap214"]
 
@@ -38,8 +39,9 @@ def export_ap214(model: Model, out_dir: Path, options: ExportOptions) -> list[Pa
     return [_write(model, Path(out_dir) / "model_ap214.step", "AP214IS", options)]
 
 
-def assembly_document(model: Model, options: ExportOptions) -> Any:
-    """An OCCT document (TDocStd_Document): one root, one component a board, each with its name and place."""
+def assembly_document(model: Model) -> Any:
+    """An OCCT document (TDocStd_Document): one root, one component a board, each in its place and with a
+    placeholder for its name."""
     from OCP.TCollection import TCollection_ExtendedString
     from OCP.TDataStd import TDataStd_Name
     from OCP.XCAFDoc import XCAFDoc_DocumentTool
@@ -51,14 +53,32 @@ def assembly_document(model: Model, options: ExportOptions) -> Any:
         TDataStd_Name.Set_s(label, TCollection_ExtendedString(text))
 
     root = shapes.NewShape()
-    name(root, title(model, options.unverified))
-    for board in model.boards:
+    name(root, _placeholder(0))
+    for index, board in enumerate(model.boards, start=1):
         part = shapes.AddShape(board_solid(board).wrapped, False)
         component = shapes.AddComponent(root, part, location(model_from_board(board)).wrapped)
-        name(part, ascii_name(board.name))
-        name(component, ascii_name(board.name))
+        name(part, _placeholder(index))
+        name(component, _placeholder(index))
     shapes.UpdateAssemblies()
     return document
+
+
+def _placeholder(index: int) -> str:
+    """What stands for a name while OCCT writes: it garbles letters beyond ASCII, and breaks long names in two."""
+    return f"~{index}~"
+
+
+def _named(text: str, model: Model, options: ExportOptions) -> str:
+    """The names in their places, encoded as ISO 10303-21 has it."""
+    names = [title(model, options.unverified), *(plain_name(board.name) for board in model.boards)]
+    return re.sub(r"'~(\d+)~'", lambda found: f"'{_encoded(names[int(found[1])])}'", text)
+
+
+def _encoded(name: str) -> str:
+    planes = (("2", "utf-16-be", "[\u0080-\uffff]+"), ("4", "utf-32-be", "[\U00010000-\U0010ffff]+"))
+    for kind, encoding, letters in planes:
+        name = re.sub(letters, lambda run, k=kind, e=encoding: f"\\X{k}\\{run[0].encode(e).hex().upper()}\\X0\\", name)
+    return name
 
 
 def _new_document() -> Any:
@@ -80,15 +100,15 @@ def _write(model: Model, path: Path, schema: str, options: ExportOptions) -> Pat
         raise ExportError(f"{path}: boards: none: a STEP file needs at least one board")
     beside = path.with_name(f".{path.stem}.occt.step")
     try:
-        _transfer(assembly_document(model, options), beside, schema, title(model, options.unverified))
+        _transfer(assembly_document(model), beside, schema)
         text = beside.read_text(encoding="ascii")
     finally:
         beside.unlink(missing_ok=True)
-    write_bytes(path, _coloured(_steady(text), model).encode("ascii"))
+    write_bytes(path, _named(_coloured(_steady(text), model), model, options).encode("ascii"))
     return path
 
 
-def _transfer(document: Any, path: Path, schema: str, name: str) -> None:
+def _transfer(document: Any, path: Path, schema: str) -> None:
     from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
     from OCP.IFSelect import IFSelect_ReturnStatus
     from OCP.Interface import Interface_Static
@@ -105,7 +125,7 @@ def _transfer(document: Any, path: Path, schema: str, name: str) -> None:
     writer.SetNameMode(True)
     done = writer.Transfer(document, STEPControl_StepModelType.STEPControl_AsIs)
     header = APIHeaderSection_MakeHeader(writer.ChangeWriter().Model())
-    header.SetName(TCollection_HAsciiString(name))
+    header.SetName(TCollection_HAsciiString(_placeholder(0)))
     header.SetTimeStamp(TCollection_HAsciiString(TIMESTAMP))
     header.SetOriginatingSystem(TCollection_HAsciiString("kerfwright"))
     if not done or writer.Write(str(path)) != IFSelect_ReturnStatus.IFSelect_RetDone:
@@ -121,8 +141,9 @@ def _quiet() -> None:
 
 
 def _steady(text: str) -> str:
-    """Count occurrences from 1 in every file: OCCT goes on counting from one export to the next."""
+    """No rounding noise, and occurrences counted from 1: OCCT goes on counting from one export to the next."""
     numbers = count(1)
+    text = wrapped_records(without_noise(text, "0."))
     return re.sub(r"(NEXT_ASSEMBLY_USAGE_OCCURRENCE\(\s*')\d+'", lambda found: f"{found[1]}{next(numbers)}'", text)
 
 

@@ -36,7 +36,7 @@ def test_truths_are_solved_to_the_same_places(name, tmp_path):
 def test_the_contacts_hold_the_boards(tmp_path):
     """Legs that were put elsewhere come back: it is the constraints that place them."""
     source = export(stool(), tmp_path, ExportOptions())[0].read_text()
-    moved, count = re.subn(r'(name="leg left", loc=place\()\(68,', r"\1(75,", source)
+    moved, count = re.subn(r'(name="leg_left", loc=place\()\(68,', r"\1(75,", source)
     assert count == 1
     assert_same(assembly(moved), stool(), places=1e-3)
 

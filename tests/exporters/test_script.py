@@ -11,7 +11,7 @@ from kerfwright.solid import assembly_solids
 from kerfwright_exporters import ExportOptions
 from kerfwright_exporters.script import export, identifiers
 from scripted import dimensions, interference, problems, run, typed_contacts
-from simple import board, rectangle, stool
+from simple import bevel, board, rectangle, stool
 from truths import AVAILABLE, truth_model
 
 truths = pytest.mark.skipif(not AVAILABLE, reason="the captures with truth are not on this machine")
@@ -60,6 +60,19 @@ def test_what_lies_on_a_contact_follows_its_neighbour(tmp_path):
         ("top", "leg right"): ("sheet", "cut"),
     }
     assert interference(solids) == 0
+
+
+def test_bevels_that_no_whole_plane_can_cut_are_cut_where_they_are(tmp_path):
+    angle = [(0, 0), (300, 0), (300, 100), (100, 100), (100, 300), (0, 300)]
+    inner = bevel((300, 100), (100, 100), 30.0, 18.0)  # its plane runs through the other leg
+    outer = bevel((0, 0), (300, 0), 20.0, 18.0)
+    model = Model(boards=(board(angle, "angle", 18.0, bevels=(inner, outer)),))
+    source = program(model, tmp_path)
+    assert source.count("bevels = [") == 1 and source.count("Plane(stretched(") == 1
+    assert_same(run(source)[0], model)
+    solids, _ = run(source, STOCK_18=20.0)
+    thicker = board(angle, "angle", 20.0, bevels=(inner, outer))
+    assert solids["angle"].volume == pytest.approx(assembly_solids(Model(boards=(thicker,)))[0][1].volume, rel=1e-9)
 
 
 def test_it_runs_by_itself_without_kerfwright(tmp_path):

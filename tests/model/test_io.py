@@ -95,6 +95,11 @@ def first(**changes) -> str:
     return broken(lambda d: d["boards"][0].update(changes))
 
 
+def name(data, *names) -> None:
+    for board, text in zip(data["boards"], names, strict=True):
+        board["name"] = text
+
+
 def thick(value) -> str:
     return first(thickness={"value": value})
 
@@ -123,7 +128,8 @@ HOSTILE = {
     "quote": (lambda: first(name='le"g'), "boards[0].name"),
     "formula": (lambda: first(name="=1+1"), "boards[0].name: '=1+1'"),
     "newline": (lambda: first(name="le\ng"), "boards[0].name"),
-    "non-ASCII": (lambda: first(name="Rückwand"), "boards[0].name: 'Rückwand'"),
+    "turned letters": (lambda: first(name="leg\u202e"), "boards[0].name: 'leg\\u202e'"),
+    "same but for coding": (lambda: broken(lambda d: name(d, "T\u00fcr", "Tu\u0308r")), "boards[1].name: 'Tu\u0308r'"),
     "same name": (lambda: broken(lambda d: d["boards"][1].update(name="Leg")), "boards[1].name: 'Leg'"),
     "no such board": (lambda: broken(lambda d: d["contacts"][0].update(b="seat")), "contacts[0].b: 'seat'"),
     "no such contact": (lambda: broken(lambda d: d["boards"][0]["bevels"][0].update(contact=7)), "[0].contact: 7"),
@@ -140,6 +146,23 @@ def test_bad_files_get_one_line(case, tmp_path):
         read_model(path)
     message = str(caught.value)
     assert message.startswith(f"{path}: ") and expected in message and "\n" not in message and len(message) < 400
+
+
+@pytest.mark.parametrize("text", ["Rückwand", "Łódź 2", "棚板", "शेल्फ", "Ru\u0308ckwand"])
+def test_names_of_any_script_are_read(text, tmp_path):
+    path = tmp_path / "model.json"
+    path.write_text(
+        broken(lambda d: (name(d, text, "other"), d.update(contacts=[], connectors=[], build_steps=[]), unlink(d))),
+        encoding="utf-8",
+    )
+    assert read_model(path).boards[0].name == text
+
+
+def unlink(data) -> None:
+    for board in data["boards"]:
+        board["same_as"] = None
+        for bevel in board["bevels"]:
+            bevel["contact"] = None
 
 
 def test_missing_binary_and_unwritable_files(tmp_path):

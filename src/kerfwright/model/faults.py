@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -17,8 +18,10 @@ from kerfwright.model.types import Board, Model
 
 __all__ = ["Fault", "faults"]
 
-# Names become file names, STEP labels and spreadsheet cells: one rule that is safe in all of them.
-SAFE_NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9 _.-]{0,98}[A-Za-z0-9_-])?")
+# Names become file names, STEP labels and spreadsheet cells: one rule that is safe in all of them. Letters of any
+# script; exporters write them as each format can carry them.
+_MARKS = " _.-"
+_LONGEST = 100
 JOIN_TOLERANCE = 1e-4  # mm between an edge's end and the next one's start; a thousand times what OCCT closes by itself
 RIGID_TOLERANCE = 1e-6  # of a pose's turn from an orthonormal one: a micrometre on a metre
 
@@ -50,15 +53,15 @@ def _name_faults(model: Model) -> Iterator[Fault]:
     first: dict[str, int] = {}
     for i, board in enumerate(model.boards):
         field = f"boards[{i}].name"
-        if not SAFE_NAME.fullmatch(board.name):
+        if not _is_safe(board.name):
             yield Fault(
                 "K101",
                 field,
-                repr(board.name),
-                "use up to 100 letters a-z, digits, space, _ . -, and begin with a letter or digit",
+                ascii(board.name) if not board.name.isprintable() else repr(board.name),
+                f"use up to {_LONGEST} letters, digits, space, _ . -, and begin with a letter or digit",
                 (board.name,),
             )
-        if (known := first.setdefault(board.name.casefold(), i)) != i:
+        if (known := first.setdefault(unicodedata.normalize("NFKC", board.name).casefold(), i)) != i:
             yield Fault(
                 "K102",
                 field,
@@ -66,6 +69,13 @@ def _name_faults(model: Model) -> Iterator[Fault]:
                 f"boards[{known}] has this name already: give each its own, case apart",
                 (board.name,),
             )
+
+
+def _is_safe(name: str) -> bool:
+    """Letters with their accents and digits (Unicode categories L, M, N) and a few marks; nothing that hides."""
+    kinds = [unicodedata.category(c)[0] for c in name]
+    sound = all(kind in "LMN" or c in _MARKS for kind, c in zip(kinds, name, strict=True))
+    return sound and len(name) <= _LONGEST and kinds[0] in "LN" and name[-1] not in " ."
 
 
 def _board_faults(index: int, board: Board) -> Iterator[Fault]:
