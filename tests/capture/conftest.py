@@ -12,7 +12,10 @@ import pytest
 
 from kerfwright.capture import Camera, Cloud, View, write_colmap_text, write_ply
 
-MODEL_IDS = {"SIMPLE_PINHOLE": 0, "PINHOLE": 1, "SIMPLE_RADIAL": 2, "RADIAL": 3, "OPENCV": 4}
+MODEL_IDS = {
+    "SIMPLE_PINHOLE": 0, "PINHOLE": 1, "SIMPLE_RADIAL": 2, "RADIAL": 3, "OPENCV": 4, "OPENCV_FISHEYE": 5,
+    "FULL_OPENCV": 6, "SIMPLE_RADIAL_FISHEYE": 8, "RADIAL_FISHEYE": 9,
+}
 
 
 def look_at(centre: np.ndarray, target: np.ndarray) -> np.ndarray:

@@ -103,7 +103,6 @@ GOOD = text(np.eye(3), np.zeros(3))
         (text(2 * np.eye(3), np.zeros(3)), "a.png\n", "camera 0 rotation"),
         (text(np.diag([1, 1, -1]), np.zeros(3)), "a.png\n", "camera 0 rotation"),
         (GOOD.replace("50.0 0.0 0.0", "50.0 0.0"), "a.png\n", "five lines of three numbers"),
-        (GOOD.replace("50.0 0.0 0.0", "0 0 0"), "a.png\n", "cameras: 0"),
     ],
 )
 def test_bad_files_are_told(tmp_path, image, content, names, told):

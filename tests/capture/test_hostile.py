@@ -10,11 +10,18 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import exports
 from kerfwright.capture import Cloud, open_capture, write_colmap_text, write_ply
+from kerfwright.capture.alicevision import read_alicevision
 from kerfwright.capture.bundler import read_bundler
 from kerfwright.capture.colmap import read_colmap
 from kerfwright.capture.images import image_size
+from kerfwright.capture.metashape import read_metashape
+from kerfwright.capture.nerfstudio import read_nerfstudio
+from kerfwright.capture.openmvg import read_openmvg
 from kerfwright.capture.ply import read_ply
+from kerfwright.capture.readers import read_cloud
+from kerfwright.capture.realitycapture import read_rc_csv, read_rc_xmp
 from kerfwright.errors import CaptureError
 
 SNIPPETS = [
@@ -88,11 +95,47 @@ def good(tmp_path_factory, shapes, write_binary):
     (folder / "list.txt").write_text("a.png 0 55.5\na.jpg\n")
     for encoding in ("ascii", "binary_little_endian", "binary_big_endian"):
         (folder / f"{encoding}.ply").write_bytes(ply_bytes(encoding))
+    other_programs(folder)
+    other_clouds(folder)
     return folder
+
+
+def other_programs(folder):
+    """cameras.csv, cameras.xml, cameras.sfm, transforms.json, sfm_data.json, and an XMP file."""
+    exports.images(folder)
+    for writer in (
+        exports.rc_csv, exports.rc_xmp, exports.metashape, exports.meshroom, exports.nerfstudio, exports.openmvg,
+    ):
+        writer(folder, exports.scene())
+    (folder / "images" / "x.xmp").rename(folder / "a.xmp")
+
+
+def other_clouds(folder):
+    import laspy
+    import open3d as o3d
+    import pye57
+
+    points = np.random.default_rng(2).uniform(size=(40, 3))
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    o3d.io.write_point_cloud(str(folder / "ascii.pcd"), cloud, write_ascii=True)
+    o3d.io.write_point_cloud(str(folder / "binary.pcd"), cloud)
+    o3d.io.write_point_cloud(str(folder / "compressed.pcd"), cloud, compressed=True)
+    (folder / "a.xyz").write_text("\n".join(" ".join(f"{v:.5f}" for v in [*p, 1, 0, -1, 9, 8, 7]) for p in points))
+    las = laspy.LasData(laspy.LasHeader(point_format=2, version="1.2"))
+    las.x, las.y, las.z = points.T
+    las.write(str(folder / "a.las"))
+    las.write(str(folder / "a.laz"))
+    file = pye57.E57(str(folder / "a.e57"), mode="w")
+    file.write_scan_raw({f"cartesian{axis}": points[:, k].copy() for k, axis in enumerate("XYZ")})
+    file.close()
 
 
 def readers(folder):
     """What reads each file."""
+
+    def picture(name):
+        return folder / "a.png"
+
     return {
         ".ply": lambda name: read_ply(folder / name),
         ".bin": lambda name: read_colmap(folder),
@@ -105,6 +148,12 @@ def readers(folder):
         ".jpg": lambda name: image_size(folder / name),
         ".png": lambda name: image_size(folder / name),
         ".tif": lambda name: image_size(folder / name),
+        ".csv": lambda name: read_rc_csv(folder / name, picture),
+        ".xmp": lambda name: read_rc_xmp([folder / name], picture),
+        ".xml": lambda name: read_metashape(folder / name, picture),
+        ".sfm": lambda name: read_alicevision(folder / name, picture),
+        ".json": lambda name: (read_openmvg if name == "sfm_data.json" else read_nerfstudio)(folder / name, picture),
+        **dict.fromkeys((".pcd", ".xyz", ".las", ".laz", ".e57"), lambda name: read_cloud(folder / name)),
     }
 
 
@@ -122,6 +171,18 @@ FILES = [
     "a.jpg",
     "a.png",
     "a.tif",
+    "cameras.csv",
+    "a.xmp",
+    "cameras.xml",
+    "cameras.sfm",
+    "transforms.json",
+    "sfm_data.json",
+    "ascii.pcd",
+    "binary.pcd",
+    "compressed.pcd",
+    "a.xyz",
+    "a.las",
+    "a.e57",
 ]
 
 
@@ -143,7 +204,7 @@ def read_only(good, folder, name, data):
 
 
 @pytest.mark.parametrize("name", FILES)
-@settings(max_examples=120, deadline=2000, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=50, deadline=2000, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(mutations=MUTATIONS)
 def test_only_our_own_errors(good, tmp_path, name, mutations):
     try:
@@ -152,7 +213,7 @@ def test_only_our_own_errors(good, tmp_path, name, mutations):
         assert "\n" not in str(error) and len(str(error)) < 600
 
 
-@pytest.mark.parametrize("name", ["../../outside.png", "/etc/hostname", "..\\..\\outside.png"])
+@pytest.mark.parametrize("name", ["../../outside.png", "..\\..\\outside.png"])
 def test_names_in_a_capture_that_lead_out_are_refused(capture_folder, name):
     (capture_folder.parent / "outside.png").write_bytes((capture_folder / "images" / "0.png").read_bytes())
     poses = capture_folder / "sparse" / "0" / "images.txt"
@@ -164,9 +225,8 @@ def test_names_in_a_capture_that_lead_out_are_refused(capture_folder, name):
 def test_terminal_codes_do_not_reach_the_terminal(capture_folder):
     poses = capture_folder / "sparse" / "0" / "images.txt"
     poses.write_text(poses.read_text().replace("0.png", "\x1b[31mred.png"))
-    with pytest.raises(CaptureError) as error:
-        open_capture(capture_folder)
-    assert "\x1b" not in str(error.value)
+    (note,) = open_capture(capture_folder).notes
+    assert "31mred.png" in note and "\x1b" not in note
 
 
 def test_unreadable_file_is_told(capture_folder):

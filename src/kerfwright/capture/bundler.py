@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
-from kerfwright.capture.images import image_size
+from kerfwright.capture.images import Locate, image_size
 from kerfwright.capture.parsing import capture_error, finite_float, read_lines, whole_number
 from kerfwright.capture.posed import LARGEST_NUMBER, PosedImage, checked_camera
 
@@ -27,8 +26,9 @@ def find_bundler(folder: Path) -> Path | None:
     return next((p for p in (folder / "bundle" / "bundle.out", folder / "bundle.out") if p.is_file()), None)
 
 
-def read_bundler(path: Path, locate: Callable[[str], Path]) -> list[PosedImage]:
-    """Images with cameras and poses in the order of the list; focal length 0 means not registered: left out.
+def read_bundler(path: Path, locate: Locate) -> list[PosedImage]:
+    """Images with cameras and poses in the order of the list; left out are those that are not there, or not registered
+    (focal length 0).
 
     Parameters
     ----------
@@ -57,10 +57,7 @@ def read_bundler(path: Path, locate: Callable[[str], Path]) -> list[PosedImage]:
         _image(name, rows, path, f"camera {i}", locate)
         for i, (name, rows) in enumerate(zip(names, cameras, strict=True))
     ]
-    registered = [image for image in images if image]
-    if not registered:
-        raise capture_error(path, "cameras", 0, "no image has a pose: export a model with registered images")
-    return registered
+    return [image for image in images if image]
 
 
 def _names(path: Path, count: int) -> list[str]:
@@ -72,24 +69,24 @@ def _names(path: Path, count: int) -> list[str]:
     return [LIST_LINE.fullmatch(line.strip()).group("name") for line in lines]
 
 
-def _image(
-    name: str, rows: list[list[str]], path: Path, field: str, locate: Callable[[str], Path]
-) -> PosedImage | None:
+def _image(name: str, rows: list[list[str]], path: Path, field: str, locate: Locate) -> PosedImage | None:
     if [len(row) for row in rows] != [3] * LINES_A_CAMERA:
         raise capture_error(
             path, field, " ".join(rows[0]), "expected five lines of three numbers: export the file again"
         )
     numbers = np.array([[finite_float(word, path, field) for word in row] for row in rows])
     focal, k1, k2 = map(float, numbers[0])
-    if focal == 0:
+    file = locate(name) if focal else None
+    if file is None:
         return None
-    width, height = image_size(locate(name))
+    width, height = image_size(file)
     camera = checked_camera("RADIAL", width, height, (focal, width / 2, height / 2, k1, k2), path, field)
     return PosedImage(name, camera, _pose(numbers[1:4], numbers[4], path, field))
 
 
 def _pose(turn: np.ndarray, translation: np.ndarray, path: Path, field: str) -> np.ndarray:
-    if np.abs(turn).max() > 2 or not np.allclose(turn @ turn.T, np.eye(3), atol=TURN_TOLERANCE) or np.linalg.det(turn) < 0:
+    square = np.abs(turn).max() < 2 and np.allclose(turn @ turn.T, np.eye(3), atol=TURN_TOLERANCE)
+    if not square or np.linalg.det(turn) < 0:
         raise capture_error(path, f"{field} rotation", turn.tolist(), "not a rotation: export the file again")
     if not (np.abs(translation) < LARGEST_NUMBER).all():
         raise capture_error(path, f"{field} translation", translation.tolist(), "not a pose: export the file again")

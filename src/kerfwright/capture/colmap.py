@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kerfwright.capture.camera import CAMERA_MODELS, Camera
+from kerfwright.capture.camera import COLMAP_MODELS, Camera
 from kerfwright.capture.parsing import capture_error, finite_float, read_bytes, read_lines, whole_number
 from kerfwright.capture.posed import PosedImage, checked_camera, pose_matrix
 from kerfwright.errors import CaptureError
@@ -57,12 +57,7 @@ def read_colmap(folder: Path) -> list[PosedImage]:
             raise capture_error(
                 path, "file", "missing", "a COLMAP model has cameras and images, both .txt or both .bin"
             )
-    images = list(images_of(folder / f"images{end}", cameras_of(folder / f"cameras{end}")))
-    if not images:
-        raise capture_error(
-            folder / f"images{end}", "images", 0, "no image has a pose: export a model with registered images"
-        )
-    return images
+    return list(images_of(folder / f"images{end}", cameras_of(folder / f"cameras{end}")))
 
 
 def _text_cameras(path: Path) -> dict[int, Camera]:
@@ -178,7 +173,7 @@ def _binary_camera(data: _Bytes, index: int) -> tuple[int, Camera]:
     camera_id, model_id, width, height = data.take("IiQQ")
     field = f"camera {index}"
     model = MODEL_NAMES[model_id] if 0 <= model_id < len(MODEL_NAMES) else f"number {model_id}"
-    params = data.take("d" * len(CAMERA_MODELS[model])) if model in CAMERA_MODELS else ()
+    params = data.take("d" * len(COLMAP_MODELS[model])) if model in COLMAP_MODELS else ()
     return camera_id, checked_camera(model, width, height, params, data.path, field)
 
 

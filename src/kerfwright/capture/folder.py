@@ -6,14 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from kerfwright.capture.bundler import find_bundler, read_bundler
-from kerfwright.capture.colmap import find_colmap, read_colmap
 from kerfwright.capture.frame import moved, up_rotation
 from kerfwright.capture.images import ImageFinder, image_size
 from kerfwright.capture.normals import normals_or_estimates
-from kerfwright.capture.parsing import capture_error
-from kerfwright.capture.ply import read_ply
+from kerfwright.capture.parsing import capture_error, shown
 from kerfwright.capture.posed import LARGEST_NUMBER, PosedImage
+from kerfwright.capture.readers import find_cameras, find_cloud, read_cloud
 from kerfwright.capture.types import Capture, Cloud, View
 from kerfwright.errors import OptionError
 from kerfwright.model import Scale
@@ -22,7 +20,9 @@ __all__ = ["ASSUMED_MILLIMETRES_PER_UNIT", "open_capture"]
 
 ASSUMED_MILLIMETRES_PER_UNIT = 1000.0
 FEWEST_POINTS = 100  # three boards with a plane each need more
-CLOUD_NAMES = ("cloud.ply", "fused.ply")
+MOST_MISSING = 0.5  # of the photographs that cameras name: more, and it is the wrong folder
+LEAST_SEEN = 0.01  # of the points that some camera sees
+SAMPLE = 2000  # points that are looked for in the photographs
 
 
 def open_capture(path: Path | str, *, up: str = "z", millimetres_per_unit: float | None = None) -> Capture:
@@ -30,9 +30,9 @@ def open_capture(path: Path | str, *, up: str = "z", millimetres_per_unit: float
 
     Parameters
     ----------
-    path : folder with images/, a COLMAP model or a Bundler file, and a cloud (PLY)
+    path : folder with images/, cameras and a cloud, of any of the formats in docs/formats.md
     up : the axis of the capture that points up: x, -x, y, -y, z, -z, or three numbers with commas between them
-    millimetres_per_unit : scale; None assumes that a unit is a metre
+    millimetres_per_unit : scale; None takes the unit of the file, or assumes a metre
 
     Returns
     -------
@@ -48,33 +48,60 @@ def open_capture(path: Path | str, *, up: str = "z", millimetres_per_unit: float
     folder = Path(path)
     if not folder.is_dir():
         raise capture_error(folder, "capture", "no such folder", "give a folder with images, cameras and a cloud")
-    scale = _scale(millimetres_per_unit)
+    _check_scale(millimetres_per_unit)
     turn = up_rotation(up)
-    views = _views(folder)
-    cloud, notes = _cloud(_find_cloud(folder), views)
-    return moved(Capture(folder.resolve().name, views, cloud, scale, notes=notes), turn)
+    views, missing = _views(folder)
+    cloud, metres, notes = _cloud(find_cloud(folder), views)
+    scale = _scale(millimetres_per_unit, metres)
+    return moved(Capture(folder.resolve().name, views, cloud, scale, notes=(*missing, *notes)), turn)
 
 
-def _scale(millimetres_per_unit: float | None) -> Scale:
+def _scale(millimetres_per_unit: float | None, metres: bool) -> Scale:
+    if millimetres_per_unit is None and metres:
+        return Scale(millimetres_per_unit=1000.0, origin="file", note="The cloud's format has metres.")
     if millimetres_per_unit is None:
         return Scale(millimetres_per_unit=ASSUMED_MILLIMETRES_PER_UNIT, origin="assumed")
-    if not (np.isfinite(millimetres_per_unit) and millimetres_per_unit > 0):
-        raise OptionError(f"--scale: {millimetres_per_unit}: give millimetres a unit, more than 0")
     return Scale(millimetres_per_unit=millimetres_per_unit, origin="given")
 
 
-def _views(folder: Path) -> tuple[View, ...]:
+def _check_scale(millimetres_per_unit: float | None) -> None:
+    if millimetres_per_unit is not None and not 0 < millimetres_per_unit < np.inf:
+        raise OptionError(f"--scale: {millimetres_per_unit}: give millimetres a unit, more than 0")
+
+
+def _views(folder: Path) -> tuple[tuple[View, ...], tuple[str, ...]]:
+    """Views whose photographs are there, in the order of the camera file, and a note of those that are not."""
     finder = ImageFinder(folder)
-    if model := find_colmap(folder):
-        images, source, base = read_colmap(model), model, None
-    elif bundle := find_bundler(folder):
-        base, source = bundle.parent, bundle
-        images = read_bundler(bundle, lambda name: finder.find(name, bundle, base))
-    else:
-        raise capture_error(
-            folder, "cameras", "none", "put a COLMAP model into sparse/0 or a Bundler file into bundle/bundle.out"
-        )
-    return tuple(_view(image, finder.find(image.name, source, base)) for image in images)
+    cameras = find_cameras(folder)
+    images = cameras.read(lambda name: finder.find(name, cameras.path, cameras.base))
+    files = [finder.find(image.name, cameras.path, cameras.base) for image in images]
+    views = tuple(_view(image, file) for image, file in zip(images, files, strict=True) if file)
+    missing = sorted(set(finder.missing))
+    if len(missing) > MOST_MISSING * (len(views) + len(missing)):
+        remedy = f"no such file in {finder.folders[0]}, nor {len(missing) - 1} more: put the photographs there"
+        raise capture_error(cameras.path, "image", missing[0], remedy)
+    if not views:
+        raise capture_error(cameras.path, "images", 0, "no image has a pose: export a model with registered images")
+    _check_different(views, cameras.path)
+    return views, _missing_note(missing, len(views))
+
+
+def _missing_note(missing: list[str], there: int) -> tuple[str, ...]:
+    if not missing:
+        return ()
+    some = ", ".join(shown(name) for name in missing[:3]) + (" and others" if len(missing) > 3 else "")
+    share = f"{len(missing)} of {len(missing) + there} photographs with cameras"
+    return (f"{share} are not there and were left out: {some}",)
+
+
+def _check_different(views: tuple[View, ...], source: Path) -> None:
+    """Two cameras of one photograph: names were matched by their ends, and folders are missing."""
+    seen: dict[Path, str] = {}
+    for view in views:
+        if view.path in seen:
+            found = f"{seen[view.path]} and {view.name}"
+            raise capture_error(source, "images", found, f"both are {view.path}: keep the folders that the names have")
+        seen[view.path] = view.name
 
 
 def _view(image: PosedImage, path: Path) -> View:
@@ -89,22 +116,26 @@ def _view(image: PosedImage, path: Path) -> View:
     return View(image.name, path, image.camera, image.camera_from_capture)
 
 
-def _find_cloud(folder: Path) -> Path:
-    """cloud.ply, else fused.ply, else the largest *.ply."""
-    files = sorted(
-        (p for p in folder.iterdir() if p.suffix.lower() == ".ply" and p.is_file()),
-        key=lambda p: (-p.stat().st_size, p.name),
-    )
-    if not files:
-        raise capture_error(folder, "cloud", "none", "put the stereo cloud there as cloud.ply")
-    return min(files, key=lambda p: CLOUD_NAMES.index(p.name) if p.name in CLOUD_NAMES else len(CLOUD_NAMES))
-
-
-def _cloud(path: Path, views: tuple[View, ...]) -> tuple[Cloud, tuple[str, ...]]:
-    read = read_ply(path)
+def _cloud(path: Path, views: tuple[View, ...]) -> tuple[Cloud, bool, tuple[str, ...]]:
+    """The cloud, whether its unit is a metre by its format, and notes."""
+    read = read_cloud(path)
     _check_points(read.points, path)
+    _check_seen(read.points, views, path)
     normals, notes = normals_or_estimates(read.points, read.normals, views)
-    return Cloud(read.points, normals, read.colours), notes
+    return Cloud(read.points, normals, read.colours), read.metres, notes
+
+
+def _check_seen(points: np.ndarray, views: tuple[View, ...], path: Path) -> None:
+    """Cameras and cloud of different frames are the commonest mistake in putting a capture together."""
+    some = points[:: max(1, len(points) // SAMPLE)]
+    seen = np.zeros(len(some), bool)
+    for view in views:
+        pixels, _ = view.project(some)
+        with np.errstate(invalid="ignore"):
+            seen |= ((pixels >= 0) & (pixels <= [view.camera.width, view.camera.height])).all(axis=1)
+    if seen.mean() < LEAST_SEEN:
+        remedy = "cameras and cloud lie in different coordinates: export both from the same project, neither moved"
+        raise capture_error(path, "points in view of a camera", f"{100 * seen.mean():.1f} %", remedy)
 
 
 def _check_points(points: np.ndarray, path: Path) -> None:

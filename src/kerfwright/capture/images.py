@@ -5,12 +5,16 @@ from __future__ import annotations
 import os
 import re
 import struct
+import unicodedata
+from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
 from kerfwright.capture.parsing import capture_error
 
-__all__ = ["ImageFinder", "image_size"]
+__all__ = ["ImageFinder", "Locate", "image_size"]
+
+Locate = Callable[[str], Path | None]  # the file of an image's name, None where it is missing
 
 SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff"})
 JPEG_SIZE_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # start of frame; ITU-T T.81, table B.1
@@ -18,42 +22,87 @@ TIFF_WIDTH, TIFF_HEIGHT, TIFF_SHORT, TIFF_LONG = 256, 257, 3, 4  # TIFF 6.0, sec
 
 
 class ImageFinder:
-    """Finds the files that camera files name. No name may lead out of the capture's folder."""
+    """Finds the files that camera files name, and remembers those that are not there in `missing`.
+
+    No name may lead out of the capture's folder. Names that other machines wrote, absolute or of Windows, are matched
+    by their ends; upper and lower case, and the two ways to write an accent, do not matter where none match exactly.
+    """
 
     def __init__(self, capture: Path) -> None:
         self.capture = capture
         self.folders = tuple(f for f in (capture / "images", capture) if f.is_dir())
-        if not any(p.suffix.lower() in SUFFIXES for f in self.folders for p in f.rglob("*")):
+        self.missing: list[str] = []
+        self._by_name: dict[str, list[Path]] = {}
+        files = [p for f in self.folders for p in sorted(f.rglob("*")) if p.suffix.lower() in SUFFIXES]
+        for path in dict.fromkeys(files):
+            for key in dict.fromkeys((_folded(path.name), _folded(path.stem))):
+                self._by_name.setdefault(key, []).append(path)
+        if not files:
             raise capture_error(
                 capture, "images", "none", "put the JPEG, PNG or TIFF photographs into its folder images/"
             )
 
-    def find(self, name: str, source: Path, base: Path | None = None) -> Path:
+    def find(self, name: str, source: Path, base: Path | None = None) -> Path | None:
         """The file of a name that `source` gives; names are relative to images/, the capture, or `base`.
+
+        None, and an entry in `missing`, where there is none.
 
         Raises
         ------
         CaptureError
-            If the name leads out of the capture's folder, or there is no such file.
+            If the name leads out of the capture's folder, or two files could be meant.
         """
         folders = (*self.folders, *((base,) if base else ()))
-        for text in dict.fromkeys((name, name.replace("\\", "/"))):
-            for folder in folders:
-                path = self._inside(folder, text, name, source)
-                if os.path.isfile(path):  # unlike Path.is_file, false for names that no file can have
-                    return path
-        raise capture_error(
-            source, "image", name, f"no such file in {self.folders[0]}: put it there, or export cameras without it"
-        )
+        if not _is_absolute(name):
+            for text in dict.fromkeys((name, name.replace("\\", "/"))):
+                for folder in folders:
+                    path = self._inside(folder, text, name, source)
+                    if os.path.isfile(path):  # unlike Path.is_file, false for names that no file can have
+                        return path
+        found = self._alike(name, source)
+        if found is None:
+            self.missing.append(name)
+        return found
+
+    def _alike(self, name: str, source: Path) -> Path | None:
+        """The file whose path ends most like the name."""
+        parts = [_folded(part) for part in re.split(r"[\\/]", name) if part not in ("", ".")]
+        if not parts:
+            return None
+        files = self._by_name.get(parts[-1], [])
+        ends = [_same_ends(parts[:-1], [_folded(part) for part in path.parts[:-1]]) for path in files]
+        best = [path for path, end in zip(files, ends, strict=True) if end == max(ends)]
+        if len(best) > 1:
+            names = " or ".join(str(path.relative_to(self.capture)) for path in best[:2])
+            raise capture_error(source, "image", name, f"could be {names}: keep one of them")
+        return best[0] if best else None
 
     def _inside(self, folder: Path, text: str, name: str, source: Path) -> Path:
         """Judged by the name alone: a user's link to a folder elsewhere is the user's will, a file's `../` is not."""
         path = Path(os.path.abspath(folder / text)) if "\0" not in text else None
-        if path is None or re.match(r"[A-Za-z]:[\\/]", text) or not path.is_relative_to(os.path.abspath(self.capture)):
+        if path is None or not path.is_relative_to(os.path.abspath(self.capture)):
             raise capture_error(
                 source, "image", name, f"outside of {self.capture}: use names relative to its folder images/"
             )
         return path
+
+
+def _is_absolute(name: str) -> bool:
+    return bool(re.match(r"[A-Za-z]:[\\/]|[\\/]", name))
+
+
+def _folded(name: str) -> str:
+    return unicodedata.normalize("NFC", name).casefold()
+
+
+def _same_ends(a: list[str], b: list[str]) -> int:
+    """How many parts are the same, counted from the end."""
+    count = 0
+    for x, y in zip(reversed(a), reversed(b), strict=False):
+        if x != y:
+            break
+        count += 1
+    return count
 
 
 def image_size(path: Path) -> tuple[int, int]:

@@ -189,8 +189,11 @@ def _grey(view: View) -> np.ndarray:
 
     grey = cv2.cvtColor(view.image(), cv2.COLOR_RGB2GRAY)
     if view.camera.distortion.any():
-        matrix = view.camera.matrix - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]
-        grey = cv2.undistort(grey, matrix, view.camera.distortion)
+        focal, middle = np.diag(view.camera.matrix)[:2], view.camera.matrix[:2, 2]
+        rows, columns = np.indices(grey.shape)
+        ideal = (np.stack([columns.ravel(), rows.ravel()], axis=1) + 0.5 - middle) / focal
+        maps = (view.camera.distort(ideal) * focal + middle - 0.5).astype(np.float32).reshape(*grey.shape, 2)
+        grey = cv2.remap(grey, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR)
     return grey
 
 

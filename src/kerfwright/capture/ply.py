@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import struct
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
@@ -13,10 +12,10 @@ import numpy as np
 
 from kerfwright.capture.parsing import capture_error
 from kerfwright.capture.ply_header import ASCII, Element, PlyHeader, read_header
+from kerfwright.capture.raw_cloud import MOST_POINTS, RawCloud
 
-__all__ = ["PlyPoints", "read_ply"]
+__all__ = ["read_ply"]
 
-MOST_POINTS = 100_000_000  # 5 GB of coordinates and normals; a cloud of a piece of carpentry needs a hundredth
 COLUMNS = {
     "points": (("x", "y", "z"),),
     "normals": (("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z")),
@@ -24,16 +23,7 @@ COLUMNS = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class PlyPoints:
-    """Columns of the vertices: points (N, 3) float64; normals (N, 3) float64 and colours (N, 3) uint8, or None."""
-
-    points: np.ndarray
-    normals: np.ndarray | None
-    colours: np.ndarray | None
-
-
-def read_ply(path: Path) -> PlyPoints:
+def read_ply(path: Path) -> RawCloud:
     """Read the vertices as they are: values are not judged, NaN included.
 
     Raises
@@ -53,7 +43,7 @@ def read_ply(path: Path) -> PlyPoints:
     except OSError as error:
         raise capture_error(path, "file", error.strerror, "check that it exists and can be read") from error
     points, normals, colours = ([table[i] for i in triple] if triple else None for triple in columns)
-    return PlyPoints(_stacked(points), _stacked(normals) if normals else None, _bytes(colours) if colours else None)
+    return RawCloud(_stacked(points), _stacked(normals) if normals else None, _bytes(colours) if colours else None)
 
 
 def _vertices(header: PlyHeader) -> tuple[int, Element]:

@@ -135,7 +135,7 @@ class Scale(Frozen):
     """Millimetres of one capture unit."""
 
     millimetres_per_unit: float = Field(gt=0)
-    origin: Literal["assumed", "given", "inferred"] = "assumed"
+    origin: Literal["assumed", "given", "file", "measured", "inferred"] = "assumed"
     standard_error: float | None = None
     note: str = ""
 
