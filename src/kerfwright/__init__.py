@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from kerfwright.model import Model
@@ -21,7 +22,15 @@ __version__ = "0.1.0"
 
 
 def reconstruct(
-    capture: Path | str, *, up: str = "z", millimetres_per_unit: float | None = None, seed: int = 0
+    capture: Path | str,
+    *,
+    up: str = "z",
+    millimetres_per_unit: float | None = None,
+    lengths: Sequence[str] = (),
+    markers: str = "",
+    crop: str = "auto",
+    ground: float | None = None,
+    seed: int = 0,
 ) -> Model:
     """Reconstruct the boards of a capture; reads the folder, writes and prints nothing.
 
@@ -30,6 +39,10 @@ def reconstruct(
     capture : folder with images, cameras and a cloud.
     up : axis of the capture that points up: x, y, z, -x, -y or -z.
     millimetres_per_unit : of the capture; None takes a unit for a metre.
+    lengths : measured lengths that give the scale instead, such as "top:x=420mm".
+    markers : markers in the photographs that give the scale instead, such as "4x4_50:40mm".
+    crop : "auto", "none", or the box to keep in the cloud's coordinates: "X0,Y0,Z0,X1,Y1,Z1".
+    ground : height of the floor along the up axis, capture units; None looks for it.
     seed : of the random generator.
 
     Raises
@@ -39,4 +52,8 @@ def reconstruct(
     from kerfwright.pipeline import ReconstructOptions
     from kerfwright.pipeline import reconstruct as run
 
-    return run(capture, ReconstructOptions(up, millimetres_per_unit, seed)).model
+    options = ReconstructOptions(
+        up=up, millimetres_per_unit=millimetres_per_unit, seed=seed, crop=crop, ground=ground, length=";".join(lengths),
+        markers=markers,
+    )  # fmt: skip
+    return run(capture, options).model

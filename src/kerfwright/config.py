@@ -23,7 +23,8 @@ __all__ = ["CONFIGURABLE", "config_path", "default_config", "read_config"]
 _OPTIONS: dict[str, dict[str, tuple[type | tuple[type, ...], str | None, str]]] = {
     "reconstruct": {
         "up": (str, '"z"', "axis of the capture that is up: x, y, z, -x, -y, -z"),
-        "scale": ((int, float), None, "millimetres a capture unit; not set: a unit is a metre, and the report says so"),
+        "scale": ((int, float, str), None, "millimetres a capture unit, or auto; not set: a unit is a metre"),
+        "markers": (str, '""', "markers in the photographs and their side, such as 4x4_50:40mm; empty: none"),
         "seed": (int, "0", "of the random generator"),
         "jobs": (int, None, "cores to use; not set: all"),
         "quiet": (bool, "false", "say nothing but errors"),

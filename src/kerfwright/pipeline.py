@@ -40,13 +40,23 @@ class ReconstructOptions:
     Attributes
     ----------
     up : axis of the capture that points up: x, y, z, -x, -y or -z.
-    millimetres_per_unit : scale of the capture; None assumes metres.
+    millimetres_per_unit : scale of the capture; None takes the unit of the file, or assumes metres.
     seed : of the one random generator.
+    crop : auto, none, or the box to keep; see `kerfwright.capture.crop_options`.
+    ground : height of the floor along the up axis in capture units; None looks for it.
+    length : measured lengths that give the scale, semicolons between them; see `kerfwright.scaling.parse_lengths`.
+    markers : markers that give the scale; see `kerfwright.capture.markers.parse_markers`.
+    scale_by_stock : take the scale at which most boards are of a stock thickness.
     """
 
     up: str = "z"
     millimetres_per_unit: float | None = None
     seed: int = 0
+    crop: str = "auto"
+    ground: float | None = None
+    length: str = ""
+    markers: str = ""
+    scale_by_stock: bool = False
 
 
 @dataclass(frozen=True)
@@ -129,10 +139,20 @@ def run_stages(
 
 
 def _capture(path: Path, options: ReconstructOptions) -> Capture:
-    from kerfwright.capture import PrepareOptions, open_capture, prepare
+    from kerfwright.capture import PrepareOptions, crop_options, open_capture, prepare
 
     opened = open_capture(path, up=options.up, millimetres_per_unit=options.millimetres_per_unit)
-    return _in_working_units(prepare(opened, PrepareOptions()))
+    if options.markers:
+        opened = _scaled_by_markers(opened, options.markers)
+    return _in_working_units(prepare(opened, PrepareOptions(**crop_options(options.crop), ground=options.ground)))
+
+
+def _scaled_by_markers(capture: Capture, text: str) -> Capture:
+    from dataclasses import replace
+
+    from kerfwright.capture.markers import marker_scale, parse_markers
+
+    return replace(capture, scale=marker_scale(capture.views, parse_markers(text)))
 
 
 def _in_working_units(capture: Capture) -> Capture:
@@ -168,7 +188,7 @@ def _refine(assembly: Assembly, parts: Parts, capture: Capture, options: Reconst
 def _check(refined: Refined, parts: Parts, capture: Capture, options: ReconstructOptions) -> Model:
     from kerfwright.solid import CheckOptions, check
 
-    model = _model(refined, parts, capture, options)
+    model = _scaled_by_boards(_model(refined, parts, capture, options), options)
     return model.model_copy(update={"findings": (*model.findings, *check(model, CheckOptions()))})
 
 
@@ -208,6 +228,15 @@ def _model(refined: Refined, parts: Parts, capture: Capture, options: Reconstruc
     )
 
 
+def _scaled_by_boards(model: Model, options: ReconstructOptions) -> Model:
+    """The model at the scale that its boards give, where that was asked for."""
+    from kerfwright.scaling import parse_lengths, scaled_by_lengths, scaled_by_stock
+
+    if options.length:
+        return scaled_by_lengths(model, parse_lengths(options.length.split(";")))
+    return scaled_by_stock(model) if options.scale_by_stock else model
+
+
 def _world_from_model(capture: Capture) -> np.ndarray:
     """4x4 from the model's millimetres to the working units of the stages."""
     import numpy as np
@@ -232,5 +261,5 @@ def _scale_finding(capture: Capture) -> tuple[Finding, ...]:
     return (Finding(
         code="K003", severity="warning", value=capture.scale.millimetres_per_unit,
         message=f"the scale is assumed: 1 capture unit = {capture.scale.millimetres_per_unit:g} mm",
-        remedy="measure one board and give --scale, millimetres a unit, before you cut",
+        remedy="measure one board and give --length or --scale before you cut",
     ),)

@@ -221,3 +221,29 @@ def test_odd_clouds_do_not_crash(kind, generator):
         normals = np.tile([0.0, 0.0, 1.0], (3000, 1))
     prepared = prepare(Capture(kind, (), Cloud(points, normals), METRES))
     assert np.isfinite(prepared.cloud.points).all() and len(prepared.cloud) >= 100
+
+
+def test_a_box_keeps_what_is_in_it_in_the_files_coordinates(capture_folder):
+    from kerfwright.capture import crop_options, open_capture
+
+    opened = open_capture(capture_folder, up="x")
+    cropped = prepare(opened, PrepareOptions(**crop_options("-0.25,-0.2,0.3,0.25,0.2,0.5")))
+    original = cropped.cloud.points @ cropped.capture_from_world[:3, :3].T + cropped.capture_from_world[:3, 3]
+    assert original[:, 2].min() > 0.3 and len(original) > 1000
+    assert any("--crop left" in note for note in cropped.notes)
+
+
+def test_without_cropping_every_point_is_kept(capture_folder):
+    from kerfwright.capture import crop_options, open_capture
+
+    opened = open_capture(capture_folder)
+    assert len(prepare(opened, PrepareOptions(**crop_options("none"))).cloud) == len(opened.cloud)
+
+
+@pytest.mark.parametrize("text", ["", "all", "1,2,3", "0,0,0,1,1,nan", "1,0,0,0,1,1", "5,5,5,6,6,6"])
+def test_what_is_no_box_is_told(capture_folder, text):
+    from kerfwright.capture import crop_options, open_capture
+    from kerfwright.errors import OptionError
+
+    with pytest.raises(OptionError, match="--crop: "):
+        prepare(open_capture(capture_folder), PrepareOptions(**crop_options(text)))

@@ -16,9 +16,9 @@ from kerfwright.capture.level import up_of_object
 from kerfwright.capture.photo_floor import floor_in_photos
 from kerfwright.capture.types import Capture, Cloud
 from kerfwright.capture.yaw import upright_turn
-from kerfwright.errors import CaptureError
+from kerfwright.errors import CaptureError, OptionError
 
-__all__ = ["PrepareOptions", "prepare"]
+__all__ = ["PrepareOptions", "crop_options", "prepare"]
 
 Z = np.array([0.0, 0.0, 1.0])
 LEAST_TILT = np.radians(0.05)  # of the floor in photographs that is put right; they show it to half of this
@@ -32,6 +32,8 @@ class PrepareOptions:
     Attributes
     ----------
     crop : leave out the floor, other objects and strays.
+    box : lowest x y z and highest x y z, (6,), in the coordinates of the cloud's file; points elsewhere are left out
+        before anything else.
     ground : height of the floor in capture units along the up axis, instead of looking for it; nothing is
         levelled then.
     photos : look for the floor in the photographs where the cloud has none; otherwise the
@@ -40,6 +42,7 @@ class PrepareOptions:
     """
 
     crop: bool = True
+    box: tuple[float, ...] | None = None
     ground: float | None = None
     photos: bool = True
     seed: int = 0
@@ -61,6 +64,7 @@ def prepare(capture: Capture, options: PrepareOptions | None = None) -> Capture:
         If too few points are left.
     """
     options = options or PrepareOptions()
+    capture = _boxed(capture, options.box) if options.box else capture
     capture, floor = _levelled(capture, options)
     if options.crop:
         capture = _cropped(capture, floor)
@@ -69,6 +73,39 @@ def prepare(capture: Capture, options: PrepareOptions | None = None) -> Capture:
     low, high = np.percentile(capture.cloud.points[:, :2], (0.1, 99.9), axis=0)
     scale = capture.scale.millimetres_per_unit
     return moved(capture, similarity(scale, np.eye(3), -scale * np.array([*(low + high) / 2, ground])))
+
+
+def crop_options(text: str) -> dict[str, bool | tuple[float, ...]]:
+    """PrepareOptions' crop and box from `auto`, `none`, or six numbers with commas between them.
+
+    Raises
+    ------
+    OptionError
+        If the text is none of these.
+    """
+    if text in ("auto", "none"):
+        return {"crop": text == "auto"}
+    try:
+        box = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        box = ()
+    if len(box) != 6 or not all(low < high for low, high in zip(box[:3], box[3:], strict=True)):
+        raise OptionError(
+            f"--crop: {text}: give auto, none, or the box to keep, lowest corner first: X0,Y0,Z0,X1,Y1,Z1 in the units "
+            "and axes of the cloud's file"
+        )
+    return {"box": box}
+
+
+def _boxed(capture: Capture, box: tuple[float, ...]) -> Capture:
+    points = capture.cloud.points @ capture.capture_from_world[:3, :3].T + capture.capture_from_world[:3, 3]
+    inside = ((points >= box[:3]) & (points <= box[3:])).all(axis=1)
+    if inside.sum() < FEWEST_POINTS:
+        low, high = points.min(axis=0), points.max(axis=0)
+        span = " to ".join(",".join(f"{x:.4g}" for x in corner) for corner in (low, high))
+        raise OptionError(f"--crop: {inside.sum()} points are in the box: the cloud goes from {span}")
+    note = f"--crop left {len(inside) - int(inside.sum())} points out"
+    return replace(capture, cloud=capture.cloud.select(inside), notes=(*capture.notes, note))
 
 
 def _levelled(capture: Capture, options: PrepareOptions) -> tuple[Capture, Floor | None]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kerfwright.commands.reconstruct import ScaleMm, Up, checked_axis, checked_scale
+from kerfwright.commands.reconstruct import Crop, Ground, ScaleMm, Up, checked_axis, checked_crop, checked_scale
 
 if TYPE_CHECKING:
     from kerfwright.report.survey import Survey
@@ -20,17 +20,21 @@ def info(
     capture: Annotated[Path, typer.Argument(metavar="CAPTURE", help="Folder with images, cameras and a cloud.")],
     up: Up = "z",
     scale: ScaleMm = None,
+    crop: Crop = "auto",
+    ground: Ground = None,
     as_json: Annotated[bool, typer.Option("--json", help="As one JSON object.")] = False,
 ) -> None:
     """Tell what CAPTURE holds, what is missing, and whether it is enough."""
     import json
 
     checked_axis(up)
-    checked_scale(scale)
-    from kerfwright.capture import PrepareOptions, open_capture, prepare
+    millimetres = checked_scale(scale)
+    checked_crop(crop)
+    from kerfwright.capture import PrepareOptions, crop_options, open_capture, prepare
     from kerfwright.report.survey import survey
 
-    found = survey(prepare(open_capture(capture, up=up, millimetres_per_unit=scale), PrepareOptions()))
+    opened = open_capture(capture, up=up, millimetres_per_unit=millimetres)
+    found = survey(prepare(opened, PrepareOptions(**crop_options(crop), ground=ground)))
     if as_json:
         findings = [f.model_dump(mode="json") for f in found.findings]
         typer.echo(json.dumps({**asdict(found), "findings": findings}))

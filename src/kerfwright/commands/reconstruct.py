@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,8 +20,12 @@ from kerfwright.supervise import supervised
 if TYPE_CHECKING:
     from kerfwright.model import Finding
 
-__all__ = ["ScaleMm", "Up", "checked_axis", "checked_scale", "reconstruct", "run_reconstruct", "say_errors"]
+__all__ = [
+    "Crop", "Ground", "ScaleMm", "Up", "checked_axis", "checked_crop", "checked_scale", "reconstruct",
+    "run_reconstruct", "say_errors",
+]
 
+AUTO = "auto"
 _UP = ("x", "y", "z", "-x", "-y", "-z")
 # Read by the numeric libraries when they are first imported.
 _THREAD_VARIABLES = (
@@ -30,8 +35,29 @@ _THREAD_VARIABLES = (
 Out = Annotated[Path, typer.Option("-o", "--out", metavar="OUT", help="Folder for the results; made if need be.")]
 Up = Annotated[str, typer.Option("--up", metavar="AXIS", help="Axis of the capture that is up: x, y, z, -x, -y, -z.")]
 ScaleMm = Annotated[
+    str | None,
+    typer.Option(
+        "--scale", metavar="MM|auto",
+        help="Millimetres a capture unit; auto: guess from stock thicknesses. If not said, a unit is a metre.",
+    ),
+]
+Lengths = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--length", metavar="BOARD:AXIS=LENGTH",
+        help="A length that you measured, instead of --scale, such as top:x=420mm. May be repeated.",
+    ),
+]
+Markers = Annotated[
+    str, typer.Option("--markers", metavar="FAMILY:SIDE", help="Printed markers in the photographs, as 4x4_50:40mm.")
+]
+Crop = Annotated[
+    str,
+    typer.Option("--crop", metavar="auto|none|BOX", help="Box to keep: X0,Y0,Z0,X1,Y1,Z1 in the cloud's coordinates."),
+]
+Ground = Annotated[
     float | None,
-    typer.Option("--scale", metavar="MM", help="Millimetres a capture unit. If not said, a unit is a metre."),
+    typer.Option("--ground", metavar="HEIGHT", help="Of the floor along the up axis, capture units; else it is found."),
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Of the random generator; the same seed, the same files.")]
 Jobs = Annotated[
@@ -47,6 +73,10 @@ def reconstruct(
     out: Out,
     up: Up = "z",
     scale: ScaleMm = None,
+    length: Lengths = None,
+    markers: Markers = "",
+    crop: Crop = "auto",
+    ground: Ground = None,
     seed: Seed = 0,
     jobs: Jobs = None,
     quiet: Quiet = False,
@@ -54,7 +84,12 @@ def reconstruct(
     verbose: Verbose = False,
 ) -> None:
     """Reconstruct the boards of CAPTURE: a STEP assembly, a DXF file a board, the model and a report."""
-    options = ReconstructOptions(up=checked_axis(up), millimetres_per_unit=checked_scale(scale), seed=seed)
+    _check_one_scale(scale, length, markers)
+    options = ReconstructOptions(
+        up=checked_axis(up), millimetres_per_unit=checked_scale(scale), seed=seed, crop=checked_crop(crop),
+        ground=ground, length=_checked_lengths(length or []), markers=_checked_markers(markers),
+        scale_by_stock=scale == AUTO,
+    )  # fmt: skip
     _limit_threads(jobs)
     reporter = reporter_for(sys.stdout if as_json else sys.stderr, quiet=quiet, as_json=as_json, verbose=verbose)
     farewell = f"Results in {out}: open report.html in a browser, model.step in FreeCAD or another CAD program."
@@ -124,11 +159,47 @@ def checked_axis(up: str) -> str:
     return up
 
 
-def checked_scale(scale: float | None) -> float | None:
-    """The scale, if it is a length."""
-    if scale is not None and not 0 < scale < float("inf"):
-        raise OptionError(f"--scale: {scale}: not a length: give the millimetres of one capture unit")
-    return scale
+def checked_scale(scale: str | None) -> float | None:
+    """The scale, if it is a length; None where it is to be found out."""
+    if scale is None or scale == AUTO:
+        return None
+    try:
+        value = float(scale)
+    except ValueError:
+        value = 0.0
+    if not 0 < value < float("inf"):
+        raise OptionError(f"--scale: {scale}: not a length: give the millimetres of one capture unit, or auto")
+    return value
+
+
+def checked_crop(crop: str) -> str:
+    """The crop, if it is one."""
+    from kerfwright.capture.prepare import crop_options
+
+    crop_options(crop)
+    return crop
+
+
+def _checked_lengths(lengths: Sequence[str]) -> str:
+    if not lengths:
+        return ""
+    from kerfwright.scaling import parse_lengths
+
+    return ";".join(length.text for length in parse_lengths(lengths))
+
+
+def _checked_markers(markers: str) -> str:
+    if markers:
+        from kerfwright.capture.markers import parse_markers
+
+        parse_markers(markers)
+    return markers
+
+
+def _check_one_scale(scale: str | None, lengths: Sequence[str] | None, markers: str) -> None:
+    given = [name for name, value in (("--scale", scale), ("--length", lengths), ("--markers", markers)) if value]
+    if len(given) > 1:
+        raise OptionError(f"{' and '.join(given)}: each gives the scale: use one of them")
 
 
 def _limit_threads(jobs: int | None) -> None:

@@ -27,6 +27,11 @@ __all__ = ["report_html"]
 
 Colour = tuple[float, float, float]
 
+_SCALES = {
+    "assumed": "assumed: measure a board before you cut", "given": "given", "file": "of the cloud's format",
+    "measured": "measured", "inferred": "guessed from the boards",
+}
+
 
 def report_html(model: Model, capture: Capture | None, colours: Sequence[Colour]) -> str:
     """The whole page; without a capture, without photographs and distances.
@@ -57,7 +62,7 @@ def report_html(model: Model, capture: Capture | None, colours: Sequence[Colour]
 def _head(model: Model) -> str:
     boards, distinct = len(model.boards), len({b.same_as or b.name for b in model.boards})
     scale = model.scale
-    how = {"assumed": "assumed: measure a board before you cut", "given": "given", "inferred": "inferred"}[scale.origin]
+    how = _SCALES[scale.origin]
     return (
         f"<h1>{escape(model.name)}</h1>"
         f'<p class="sum">{boards} boards, {distinct} different; {len(model.contacts)} contacts. '
