@@ -108,6 +108,29 @@ def test_a_faulty_model_is_checked_and_not_exported(kerfwright, tmp_path):
     assert refused.returncode == 2 and refused.stderr.count("\n") == 1 and not (tmp_path / "out").exists()
 
 
+CROSSING = {"kind": "line", "start": [0, 0], "end": [100, 50]}
+FAULTS = {
+    "other version": lambda d: d.update(version=9),
+    "crossing": lambda d: d["boards"][0]["cut_path"]["outer"]["edges"].__setitem__(0, CROSSING),
+    "zero thickness": lambda d: d["boards"][0]["thickness"].update(value=0),
+    "slash": lambda d: d["boards"][0].update(name="a/b"),
+    "quote": lambda d: d["boards"][0].update(name='a"b'),
+    "formula": lambda d: d["boards"][0].update(name="=1+1"),
+    "hidden letter": lambda d: d["boards"][0].update(name="a\u200b"),
+    "two of one name": lambda d: d["boards"].append(d["boards"][0]),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_models_that_no_file_can_hold_are_refused_in_one_line(kerfwright, sound, tmp_path, fault):
+    data = json.loads(sound.read_text())
+    FAULTS[fault](data)
+    sound.write_text(json.dumps(data))
+    done = kerfwright("export", sound, "all", "-o", tmp_path / "out", "--force")
+    assert done.returncode == 2 and done.stdout == "" and done.stderr.count("\n") == 1, done.stderr
+    assert str(sound) in done.stderr and not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

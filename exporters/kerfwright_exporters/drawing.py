@@ -50,7 +50,7 @@ class BevelLine:
 class Text:
     """One line of text, centred on a point; height in mm, turn in radians."""
 
-    operation: Literal["bevel", "label", "stamp"]
+    operation: Literal["bevel", "dimension", "label", "stamp"]
     text: str
     at: tuple[float, float]
     height: float

@@ -1,13 +1,11 @@
-"""Boards on sheets: bottom-left placement on a raster, over many orders of the boards.
+"""Boards on sheets: a first layout, then tighter and tighter ones until nothing gives.
 
-The sheet is a raster of cells, column by column; a board is, for each column it covers, the runs of cells it needs.
-Where a run meets an occupied cell, the board jumps past it. Hundreds of orders are tried on a coarse raster (simulated
-annealing over the order, Kirkpatrick et al., Science 220, 1983), and the best of them laid again on a fine one. Cells
-are counted as covered when the board, grown by half the spacing, touches them: what fits on the raster fits on the
-sheet. Holes of boards are free cells, and small boards go into them.
+The last sheet is cut shorter by a little, what stands over is pushed back onto it, and boards that now overlap are
+moved until none do, to any sheet and at any turn allowed (Gardeyn and Wauters, sparrow, 2025, for one endless strip;
+here for sheets, with boards in the holes of others). Where that fails, the best layout is disturbed and tried again.
 
-The search counts layouts, not seconds: the same boards give the same sheets on any machine. spyrrow packs a strip as
-tightly, but stops by the clock, and knows neither sheets nor holes.
+The search counts moves, not seconds: the same boards give the same sheets on any load. spyrrow, the packaged form of
+sparrow, stops by the clock, and knows neither sheets nor holes.
 """
 
 from __future__ import annotations
@@ -17,40 +15,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kerfwright_exporters._raster import place_all
+from kerfwright_exporters._separation import disrupt, separate, squeeze
+from kerfwright_exporters.bottom_left import first_places
+from kerfwright_exporters.convex import convex_parts
+from kerfwright_exporters.places import NestOptions, Place
 
 if TYPE_CHECKING:
     from shapely.geometry import Polygon
 
 __all__ = ["NestOptions", "Place", "nest"]
 
-EDGE = 1e-6  # of a cell; less than that in a cell is rounding
-TRIALS_A_BOARD = 12  # few boards have few orders worth trying
-WARMTH = 0.02  # of the cost: how much worse a layout the search takes at its start
-
-
-@dataclass(frozen=True)
-class NestOptions:
-    """How boards are laid on sheets; lengths in mm."""
-
-    length: float
-    width: float
-    spacing: float  # least distance of two boards
-    turns: tuple[int, ...] = (0, 90, 180, 270)  # degrees that a board may be turned by
-    layouts: int = 400  # orders tried at most on the coarse raster; one takes some 10 milliseconds for 30 boards
-    finalists: int = 6  # best orders laid again on the fine raster
-    coarse: int = 200  # cells across the width: 6 mm on a sheet of 1220
-    fine: int = 600  # 2 mm; finer is slower and hardly tighter
-    seed: int = 0
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where a board lies: x_in_sheet = turn(x_in_board) + shift; turn in degrees, shift in mm; sheets from 0."""
-
-    sheet: int
-    turn: int
-    shift: tuple[float, float]
+MOST_MOVES = 40_000  # of all boards together
+LONG_STEP, SHORT_STEP, SHORTEST_STEP = (
+    0.01,
+    0.002,
+    0.0002,
+)  # of the length in use, by which the last sheet is cut shorter
+EXPLORING = 0.7  # share of the moves spent on long steps
+DENSEST = 0.97  # share of a sheet that boards with curves and corners hardly fill
+MANY_CORNERS, STRAY = 24, 0.05  # outlines of more corners are drawn with fewer, up to twice so far outside, mm
 
 
 def nest(outlines: list[Polygon], options: NestOptions) -> list[Place]:
@@ -63,107 +46,169 @@ def nest(outlines: list[Polygon], options: NestOptions) -> list[Place]:
     """
     if not outlines:
         return []
-    fine = _Raster(outlines, options, options.fine)
-    finalists = [order for _, order in _search(_Raster(outlines, options, options.coarse), outlines, options)]
-    return fine.places(min(finalists, key=fine.cost))
+    places = first_places(outlines, options)
+    if len(outlines) == 1 or not options.moves:
+        return places
+    return _Search(outlines, options, places).best_places()
 
 
-def _search(raster: _Raster, outlines: list[Polygon], options: NestOptions) -> list[tuple[float, np.ndarray]]:
-    """Cost and order of the best layouts found on the coarse raster, best first."""
-    rng = np.random.default_rng(options.seed)
-    seen = [(raster.cost(order), order) for order in _starts(outlines)]
-    current, order = min(seen, key=lambda entry: entry[0])
-    trials = min(options.layouts, TRIALS_A_BOARD * len(outlines)) if len(outlines) > 1 else 0
-    for trial in range(trials):
-        warmth = WARMTH * current * (1 - trial / trials)
-        candidate = _neighbour(order, rng)
-        found = raster.cost(candidate)
-        if found <= current or rng.random() < np.exp((current - found) / warmth):
-            current, order = found, candidate
-            seen.append((found, candidate))
-    return sorted(seen, key=lambda entry: entry[0])[: options.finalists]
+@dataclass
+class _Layout:
+    """Sheet, turn (as an index) and lower left corner of every grown outline, and how long each sheet is."""
+
+    sheets: np.ndarray
+    turned: np.ndarray
+    x: np.ndarray
+    y: np.ndarray
+    lengths: np.ndarray
+
+    def copy(self) -> _Layout:
+        return _Layout(*(value.copy() for value in vars(self).values()))
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        return self.sheets, self.turned, self.x, self.y
 
 
-def _starts(outlines: list[Polygon]) -> list[np.ndarray]:
-    """Orders that often do well: by area, by the longer side, by the shorter side, largest first."""
-    spans = np.array([np.ptp(np.array(o.exterior.coords), axis=0) for o in outlines])
-    keys = (np.array([o.area for o in outlines]), spans.max(axis=1), spans.min(axis=1))
-    return [np.argsort(-key, kind="stable") for key in keys]
+class _Shapes:
+    """The outlines, grown by half the spacing, as convex parts at every turn, lower left corners at the origin."""
+
+    def __init__(self, outlines: list[Polygon], options: NestOptions) -> None:
+        self.corners: list[np.ndarray] = []
+        corners, normals, firsts, boxes, parts, sizes = [], [], [0], [], [0], []
+        for outline in outlines:
+            pieces = convex_parts(_grown(outline, options.spacing / 2))
+            for turn in options.turns:
+                turned = [piece @ _turn(turn).T for piece in pieces]
+                low = np.concatenate(turned).min(axis=0)
+                self.corners.append(low)
+                for piece in (piece - low for piece in turned):
+                    along = np.roll(piece, -1, axis=0) - piece
+                    corners.append(piece)
+                    normals.append(np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None])
+                    firsts.append(firsts[-1] + len(piece))
+                    boxes.append([*piece.min(axis=0), *piece.max(axis=0)])
+                parts.append(len(boxes))
+                sizes.append(np.ptp(np.concatenate(turned), axis=0))
+        all_corners, all_normals = np.concatenate(corners), np.concatenate(normals)
+        reach = (all_corners * all_normals).sum(axis=1)
+        starts = np.array(firsts)
+        self.sizes = np.array(sizes)
+        self.arrays = (
+            all_corners,
+            all_normals,
+            reach,
+            starts[:-1],
+            starts[1:],
+            np.array(boxes),
+            np.array(parts),
+            self.sizes,
+        )
 
 
-def _neighbour(order: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The order with two boards swapped, or one taken to another place."""
-    a, b = rng.choice(len(order), 2, replace=False)
-    changed = order.copy()
-    if rng.random() < 0.5:
-        changed[[a, b]] = changed[[b, a]]
-        return changed
-    return np.insert(np.delete(changed, a), b, order[a])
+def _turn(degrees: int) -> np.ndarray:
+    c, s = round(np.cos(np.radians(degrees)), 12), round(np.sin(np.radians(degrees)), 12)
+    return np.array([[c, -s], [s, c]])
 
 
-class _Raster:
-    """The outlines in cells, at every turn; the sheet is grown like them by half the spacing on every side."""
-
-    def __init__(self, outlines: list[Polygon], options: NestOptions, cells: int) -> None:
-        self.options = options
-        grown = np.array([options.length, options.width]) + options.spacing
-        columns = max(1, round(grown[0] / (grown[1] / cells)))
-        self.cell = grown / (columns, cells)  # all but square: whole cells in both directions, so that exact fits fit
-        shapes = [[self._shape(outline, turn) for turn in options.turns] for outline in outlines]
-        self.corners = [[corner for _, corner in row] for row in shapes]
-        runs = [r for row in shapes for r, _ in row]
-        self.starts = np.cumsum([0, *(len(r) for r in runs)]).astype(np.int64)
-        self.runs = np.concatenate(runs).astype(np.int64)
-        self.free = np.empty((len(outlines), columns, cells), np.int16)
-        self._require_room(len(outlines), runs)
-
-    def _require_room(self, count: int, runs: list[np.ndarray]) -> None:
-        _, columns, cells = self.free.shape
-        fits = [r[:, 0].max() < columns and r[:, 2].max() <= cells for r in runs]
-        turns = len(self.options.turns)
-        for k in range(count):
-            if not any(fits[k * turns : (k + 1) * turns]):
-                raise ValueError(k)
-
-    def _shape(self, outline: Polygon, turn: int) -> tuple[np.ndarray, np.ndarray]:
-        """Runs (N, 3) of the grown outline, the longest first, and where its cell 0, 0 lies, mm."""
-        from shapely import affinity
-
-        turned = affinity.rotate(outline, turn, origin=(0, 0))
-        grown = turned.buffer(self.options.spacing / 2, join_style="mitre", mitre_limit=2.0)
-        runs = _runs(grown, self.cell)
-        return runs[np.argsort(runs[:, 1] - runs[:, 2], kind="stable")], np.array(grown.bounds[:2])
-
-    def cost(self, order: np.ndarray) -> float:
-        """Sheets before the last one, and the share of the last one's length that is used."""
-        sheet, _, _, _, end = place_all(order, self.runs, self.starts, len(self.options.turns), self.free)
-        last = sheet.max()
-        return float(last + end[sheet == last].max() / self.free.shape[1])
-
-    def places(self, order: np.ndarray) -> list[Place]:
-        """The places that an order gives, by board."""
-        sheet, turn, x, y, _ = place_all(order, self.runs, self.starts, len(self.options.turns), self.free)
-        found = []
-        for k in range(len(order)):
-            corner = np.array([x[k], y[k]]) * self.cell - self.options.spacing / 2
-            shift = corner - self.corners[k][turn[k]]
-            found.append(Place(int(sheet[k]), self.options.turns[turn[k]], (float(shift[0]), float(shift[1]))))
-        return found
+def _grown(outline: Polygon, distance: float) -> Polygon:
+    """The outline let out; one of many corners by a little more and with fewer of them."""
+    grown = outline.buffer(distance, join_style="mitre", mitre_limit=2.0)
+    if len(grown.exterior.coords) + sum(len(ring.coords) for ring in grown.interiors) <= MANY_CORNERS:
+        return grown
+    return grown.buffer(STRAY, join_style="mitre", mitre_limit=2.0).simplify(STRAY)
 
 
-def _runs(shape: Polygon, cell: np.ndarray) -> np.ndarray:
-    """Runs (N, 3) of column, first cell and cell after the last that a shape covers, counted from its lower left.
+class _Search:
+    """Tighter and tighter layouts of the same boards."""
 
-    What lies of the shape in one column is in connected parts, and a part touches every cell between its ends.
-    """
-    import shapely
+    def __init__(self, outlines: list[Polygon], options: NestOptions, places: list[Place]) -> None:
+        self.options, self.first = options, places
+        self.shapes = _Shapes(outlines, options)
+        self.areas = np.array([outline.area for outline in outlines])
+        self.turns = len(options.turns)
+        self.full = np.array([options.length, options.width]) + options.spacing
+        self.rng = np.random.default_rng(options.seed)
+        self.moves = min(MOST_MOVES, options.moves * len(outlines))
 
-    low, high = np.array(shape.bounds).reshape(2, 2)
-    columns = int(np.ceil((high[0] - low[0]) / cell[0] - EDGE))
-    left = low[0] + cell[0] * np.arange(columns)
-    slack = EDGE * cell[0]  # what only touches the next column is not in it
-    strips = shapely.box(left + slack, low[1] - 1, left + cell[0] - slack, high[1] + 1)
-    parts, column = shapely.get_parts(shapely.intersection(shape, strips), return_index=True)
-    ends = (shapely.bounds(parts)[:, [1, 3]] - low[1]) / cell[1]
-    first, last = np.floor(ends[:, 0] + EDGE), np.ceil(ends[:, 1] - EDGE)
-    return np.stack([column, first, np.maximum(last, first + 1)], axis=1).astype(np.int64)
+    def best_places(self) -> list[Place]:
+        """The best layout found; the first one, where drawing outlines with fewer corners makes one too large."""
+        best = self._started()
+        sizes = self.shapes.sizes.reshape(-1, self.turns, 2)
+        if not (sizes <= self.full + 1e-9).all(axis=2).any(axis=1).all():
+            return self.first
+        best = self._shortened(self._fewer_sheets(best), sizes)
+        return [self._place(best, k) for k in range(len(self.areas))]
+
+    def _started(self) -> _Layout:
+        turned = np.array([self.options.turns.index(place.turn) for place in self.first])
+        corners = [self.shapes.corners[k * self.turns + t] for k, t in enumerate(turned)]
+        x, y = (np.array([p.shift for p in self.first]) + corners + self.options.spacing / 2).T
+        sheets = np.array([place.sheet for place in self.first])
+        lengths = np.full(sheets.max() + 1, self.full[0])
+        return _Layout(sheets, turned, x.copy(), y.copy(), lengths)
+
+    def _place(self, layout: _Layout, k: int) -> Place:
+        corner = self.shapes.corners[k * self.turns + layout.turned[k]]
+        shift = np.array([layout.x[k], layout.y[k]]) - corner - self.options.spacing / 2
+        return Place(int(layout.sheets[k]), self.options.turns[layout.turned[k]], (float(shift[0]), float(shift[1])))
+
+    def _fewer_sheets(self, best: _Layout) -> _Layout:
+        """Without the last sheet, as long as its boards find room on the others."""
+        while len(best.lengths) > 1 and self.areas.sum() < DENSEST * self.full.prod() * (len(best.lengths) - 1):
+            fewer = best.copy()
+            fewer.lengths = fewer.lengths[:-1]
+            if not self._apart(fewer, self.moves // 3):
+                return best
+            best = fewer
+        return best
+
+    def _shortened(self, best: _Layout, sizes: np.ndarray) -> _Layout:
+        """With the last sheet as short as it gets."""
+        best.lengths[-1] = self._used(best)
+        exploring, step, failures = (1 - EXPLORING) * self.moves, LONG_STEP, 0
+        least = self._least_length(best, sizes)
+        while self.moves > 0:
+            compressing = self.moves < exploring
+            step = min(step, SHORT_STEP) if compressing else step
+            goal = best.copy()
+            goal.lengths[-1] -= step * goal.lengths.sum()
+            if goal.lengths[-1] < least:
+                break
+            if failures and not compressing:
+                disrupt(*self._on(goal), self.areas, self._number())
+            if self._apart(goal, self.moves):
+                best, failures = goal, 0
+                best.lengths[-1] = min(best.lengths[-1], self._used(best))
+            else:
+                failures += 1
+                step = max(0.7 * step, SHORTEST_STEP)
+        return best
+
+    def _least_length(self, best: _Layout, sizes: np.ndarray) -> float:
+        """What the last sheet cannot be shorter than: an only one holds all boards, others the smallest at least."""
+        if len(best.lengths) > 1:
+            return float(sizes[:, :, 0].min())
+        return max(self.areas.sum() / (DENSEST * self.full[1]), float(sizes[:, :, 0].min(axis=1).max()))
+
+    def _used(self, layout: _Layout) -> float:
+        """How far boards reach on the last sheet."""
+        index = np.arange(len(self.areas)) * self.turns + layout.turned
+        ends = layout.x + self.shapes.sizes[index, 0]
+        return float(ends[layout.sheets == len(layout.lengths) - 1].max(initial=0.0))
+
+    def _on(self, layout: _Layout) -> tuple:
+        return self.shapes.arrays, self.turns, layout.lengths, self.full[1], layout.arrays
+
+    def _apart(self, layout: _Layout, moves: int) -> bool:
+        """Push all boards onto their sheets and move them until none overlap; the moves are counted."""
+        if not squeeze(*self._on(layout), self._number()):
+            self.moves -= 1
+            return False
+        weights = np.ones((len(self.areas), len(self.areas)))
+        done, left = separate(*self._on(layout), weights, self._number(), moves)
+        self.moves -= max(1, moves - left)
+        return bool(done)
+
+    def _number(self) -> int:
+        return int(self.rng.integers(1 << 30))

@@ -1,4 +1,4 @@
-"""Cut sheets as a PDF: one page a sheet, drawn to a round scale, with names and sizes."""
+"""Cut sheets as a PDF: one page a sheet, drawn to a round scale, with names, sizes and dimension lines."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ import numpy as np
 from kerfwright.model import Model
 from kerfwright.model.geometry import sample_loop
 from kerfwright_exporters.cutlist import length_text
+from kerfwright_exporters.dimensions import Dimension, sheet_dimensions
 from kerfwright_exporters.naming import STAMP, ascii_name, title
 from kerfwright_exporters.options import ExportOptions
 
 if TYPE_CHECKING:
     from kerfwright_exporters.sheets import LaidBoard, Sheet
 
-__all__ = ["sheets_pdf"]
+__all__ = ["sheet_scale", "sheets_pdf"]
 
 PAGE = (297.0, 210.0)  # A4 across, mm
 BORDER, HEAD = 12.0, 16.0  # mm round the drawing, and for the title above it
@@ -43,7 +44,7 @@ def sheets_pdf(model: Model, sheets: list[Sheet], options: ExportOptions) -> byt
 def _page(canvas: Any, model: Model, sheet: Sheet, options: ExportOptions) -> None:
     from kerfwright_exporters.sheets import caption
 
-    scale = _scale(sheet)
+    scale = sheet_scale(sheet)
     canvas.setFont("Helvetica-Bold", 4.5)
     canvas.drawString(BORDER, PAGE[1] - BORDER, _shown(title(model, False), ascii_name(model.name)))
     canvas.setFont("Helvetica", 3.5)
@@ -58,9 +59,19 @@ def _page(canvas: Any, model: Model, sheet: Sheet, options: ExportOptions) -> No
     canvas.rect(0, 0, sheet.length / scale, sheet.width / scale)
     for board in sheet.boards:
         _board(canvas, board, scale, options)
+    for dimension in sheet_dimensions(sheet, scale, options):
+        _dimension(canvas, dimension, scale)
 
 
-def _scale(sheet: Sheet) -> int:
+def _dimension(canvas: Any, dimension: Dimension, scale: int) -> None:
+    canvas.setLineWidth(0.1)
+    canvas.setStrokeColorRGB(0.35, 0.35, 0.35)
+    for start, end in dimension.lines:
+        canvas.line(*(np.concatenate([start, end]) / scale))
+    _text(canvas, dimension.text, np.array(dimension.at) / scale, dimension.height / scale, dimension.turn)
+
+
+def sheet_scale(sheet: Sheet) -> int:
     """The first round scale at which the sheet fits the page."""
     room = (PAGE[0] - 2 * BORDER, PAGE[1] - 2 * BORDER - HEAD)
     needed = max(sheet.length / room[0], sheet.width / room[1])

@@ -9,6 +9,7 @@ import json
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,13 +18,15 @@ from kerfwright.model import Line, Loop, Model
 from kerfwright.model.geometry import path_polygon
 from kerfwright.model.io import write_bytes
 from kerfwright_exporters.cutlist import length_text
+from kerfwright_exporters.dimensions import OUTSIDE, sheet_dimensions
 from kerfwright_exporters.drawing import Drawing, Text, board_drawing, cutting_path, moved_drawing
 from kerfwright_exporters.dxf import add_drawing, dxf_bytes, new_document
 from kerfwright_exporters.layers import layer_colour, layer_name
 from kerfwright_exporters.naming import file_stems, plain_name
 from kerfwright_exporters.nesting import NestOptions, Place, nest
 from kerfwright_exporters.options import ExportOptions
-from kerfwright_exporters.svg import drawing_elements, svg_document
+from kerfwright_exporters.pdf import sheet_scale, sheets_pdf
+from kerfwright_exporters.svg import dimension_elements, drawing_elements, svg_document
 
 __all__ = ["LaidBoard", "Sheet", "export", "lay_sheets"]
 
@@ -66,8 +69,6 @@ def export(model: Model, out_dir: Path, options: ExportOptions) -> list[Path]:
     ExportError
         If a board is larger than a sheet.
     """
-    from kerfwright_exporters.pdf import sheets_pdf
-
     folder = Path(out_dir) / "sheets"
     folder.mkdir(parents=True, exist_ok=True)
     sheets = lay_sheets(model, options)
@@ -170,9 +171,20 @@ def _dxf(sheet: Sheet, options: ExportOptions, name: str) -> bytes:
     document.modelspace().add_lwpolyline(corners, close=True, dxfattribs={"layer": layer})
     for board in sheet.boards:
         add_drawing(document, board.drawing, options)
+    _add_dimensions(document, sheet, options)
     title = Text("label", caption(sheet, options), (sheet.length / 2, sheet.width + 30), 20.0)
     add_drawing(document, Drawing((), (), (title,)), options)
     return dxf_bytes(document, name)
+
+
+def _add_dimensions(document: Any, sheet: Sheet, options: ExportOptions) -> None:
+    layer = layer_name("dimension", options)
+    document.layers.add(layer, color=layer_colour("dimension"))
+    for dimension in sheet_dimensions(sheet, sheet_scale(sheet), options):
+        for ends in dimension.lines:
+            document.modelspace().add_line(*(p / options.per_unit for p in ends), dxfattribs={"layer": layer})
+        text = Text("dimension", dimension.text, dimension.at, dimension.height, dimension.turn)
+        add_drawing(document, Drawing((), (), (text,)), options)
 
 
 def _svg(sheet: Sheet, options: ExportOptions) -> bytes:
@@ -182,7 +194,11 @@ def _svg(sheet: Sheet, options: ExportOptions) -> bytes:
         f'height="{sheet.width * scale:.4f}" fill="none" stroke="#7F7F7F" stroke-width="{scale:.4f}"/>'
     )
     elements = [border, *(e for board in sheet.boards for e in drawing_elements(board.drawing, options))]
-    box = (np.array([-10.0, -10.0]), np.array([sheet.length + 10, sheet.width + 10]))
+    elements += [
+        e for d in sheet_dimensions(sheet, sheet_scale(sheet), options) for e in dimension_elements(d, options)
+    ]
+    rim = 2 * OUTSIDE * sheet_scale(sheet)  # for the sheet's own dimensions
+    box = (np.array([-rim, -rim]), np.array([sheet.length + rim, sheet.width + rim]))
     return svg_document(elements, box, options)
 
 

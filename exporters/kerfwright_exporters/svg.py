@@ -14,12 +14,13 @@ import numpy as np
 from kerfwright.model import Arc, Bezier, Circle, Edge, Loop, Model
 from kerfwright.model.geometry import arc_circle, sample_loop
 from kerfwright.model.io import write_bytes
+from kerfwright_exporters.dimensions import Dimension
 from kerfwright_exporters.drawing import BevelLine, Cut, Drawing, Text, board_drawing
 from kerfwright_exporters.layers import layer_name
 from kerfwright_exporters.naming import file_stems
 from kerfwright_exporters.options import ExportOptions
 
-__all__ = ["drawing_elements", "export", "svg_document"]
+__all__ = ["dimension_elements", "drawing_elements", "export", "svg_document"]
 
 SHAPER = "http://www.shapertools.com/namespaces/shaper"
 MARGIN = 5.0  # mm of white round the drawing, so that strokes on its border show
@@ -30,7 +31,7 @@ _STYLES = {
     "inside_kerf": 'fill="none" stroke="#7F7F7F"',
 }
 _CUT_TYPES = {"outside": "outside", "inside": "inside", "outside_kerf": "online", "inside_kerf": "online"}
-_TEXT_COLOURS = {"label": "#0068FF", "bevel": "#0068FF", "stamp": "#D00000"}
+_TEXT_COLOURS = {"label": "#0068FF", "bevel": "#0068FF", "stamp": "#D00000", "dimension": "#7F7F7F"}
 
 
 def export(model: Model, out_dir: Path, options: ExportOptions) -> list[Path]:
@@ -119,6 +120,18 @@ def _bevel(bevel: BevelLine, options: ExportOptions) -> str:
         f'<line x1="{x1}" y1="{y1}" x2="{x2}" y2="{y2}" class={quoteattr(layer)} stroke="#0068FF" '
         f'stroke-width="{_number(0.5 / options.per_unit)}" shaper:cutType="guide"/>'
     )
+
+
+def dimension_elements(dimension: Dimension, options: ExportOptions) -> Iterator[str]:
+    """The lines of a dimension, which a Shaper takes as guides, and its figure."""
+    layer, width = layer_name("dimension", options), _number(0.2 / options.per_unit)
+    for ends in dimension.lines:
+        (x1, y1), (x2, y2) = (_at(tuple(p), options).split() for p in ends)
+        yield (
+            f'<line x1="{x1}" y1="{y1}" x2="{x2}" y2="{y2}" class={quoteattr(layer)} stroke="#7F7F7F" '
+            f'stroke-width="{width}" shaper:cutType="guide"/>'
+        )
+    yield _text(Text("dimension", dimension.text, dimension.at, dimension.height, dimension.turn), options)
 
 
 def _text(text: Text, options: ExportOptions) -> str:

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from itertools import combinations
 
 import ezdxf
@@ -14,6 +15,8 @@ from kerfwright.errors import ExportError, OptionError
 from kerfwright.model import Model
 from kerfwright.model.geometry import path_area, sample_loop
 from kerfwright_exporters import ExportOptions
+from kerfwright_exporters.convex import convex_parts
+from kerfwright_exporters.dimensions import sheet_dimensions
 from kerfwright_exporters.nesting import NestOptions, nest
 from kerfwright_exporters.sheets import export, lay_sheets
 from simple import board, hole, polygon, rectangle, stool
@@ -44,7 +47,7 @@ def laid(shapes, places):
 @pytest.mark.parametrize(("count", "seed"), [(24, 1), (40, 2)])
 def test_boards_keep_their_distance_on_few_sheets(count, seed):
     shapes = outlines(count, seed)
-    options = NestOptions(1500, 800, 6.0, layouts=20, finalists=3, coarse=100, fine=200)
+    options = NestOptions(1500, 800, 6.0, layouts=20, coarse=100, fine=200, moves=60)
     places = nest(shapes, options)
     room = shapely.box(-1e-6, -1e-6, 1500 + 1e-6, 800 + 1e-6)
     put = laid(shapes, places)
@@ -56,9 +59,38 @@ def test_boards_keep_their_distance_on_few_sheets(count, seed):
     assert nest(shapes, options) == places
 
 
+@pytest.mark.parametrize("seed", [1, 2])
+def test_moving_boards_tightens_the_first_layout(seed):
+    shapes = outlines(16, seed)
+    options = NestOptions(4000, 800, 6.0, layouts=20, coarse=100, fine=200, moves=150)
+    first, tight = (laid(shapes, nest(shapes, replace(options, moves=moves))) for moves in (0, 150))
+    ends = [max(board.bounds[2] for board in found) for found in (first, tight)]
+    assert ends[1] < 0.98 * ends[0]
+    assert min(a.distance(b) for a, b in combinations(tight, 2)) >= 6 - 1e-6
+
+
+def test_a_sheet_that_is_not_needed_is_saved():
+    """Four triangles of which each pair makes a square, in the order that leaves most room between them."""
+    triangle = shapely.Polygon([(0, 0), (300, 0), (0, 300)])
+    places = nest([triangle] * 4, NestOptions(640, 320, 6.0, layouts=1, moves=500))
+    assert {place.sheet for place in places} == {0}
+
+
+def test_parts_are_convex_and_make_up_the_whole():
+    plate = shapely.Polygon(
+        [(0, 0), (300, 0), (300, 100), (200, 100), (200, 60), (100, 60), (100, 200), (0, 200)],
+        [[(20, 20), (20, 50), (60, 50), (60, 20)]],
+    )
+    parts = [shapely.Polygon(part) for part in convex_parts(plate)]
+    assert all(part.exterior.is_ccw and part.equals(part.convex_hull) for part in parts)
+    assert shapely.union_all(parts).symmetric_difference(plate).area < 1e-6
+    assert sum(part.area for part in parts) == pytest.approx(plate.area) and len(parts) <= 8
+    assert len(convex_parts(shapely.box(0, 0, 4, 2))) == 1
+
+
 def test_small_boards_go_into_holes():
     frame = shapely.Polygon(shapely.box(0, 0, 500, 400).exterior, [shapely.box(50, 50, 450, 350).exterior])
-    places = nest([frame, shapely.box(0, 0, 300, 200)], NestOptions(520, 420, 6.0, layouts=5))
+    places = nest([frame, shapely.box(0, 0, 300, 200)], NestOptions(520, 420, 6.0, layouts=5, moves=50))
     assert [p.sheet for p in places] == [0, 0]
     put = laid([frame, shapely.box(0, 0, 300, 200)], places)
     assert put[0].distance(put[1]) >= 6 - 1e-6
@@ -107,6 +139,27 @@ def test_files_by_stock_with_exact_outlines(tmp_path):
     summary = json.loads(paths[-1].read_text())
     assert summary["sheets"][1]["utilisation"] == pytest.approx((200 * 120 - np.pi * 144) / (2440 * 1220), abs=1e-4)
     assert paths[-2].read_bytes().startswith(b"%PDF-1.") and paths[-2].read_bytes().rstrip().endswith(b"%%EOF")
+
+
+def test_dimension_lines_tell_sizes_and_lie_on_their_boards():
+    boards = (board(rectangle(600, 400), "door"), board(rectangle(500, 30), "slat"))
+    (sheet,) = lay_sheets(Model(boards=boards), ExportOptions())
+    found = list(sheet_dimensions(sheet, 10.0, ExportOptions()))
+    assert sorted(d.text for d in found) == ["1220.0 mm", "2440.0 mm", "400.0 mm", "600.0 mm"]  # the slat has a label
+    outline = shapely.Polygon(sample_loop(next(b for b in sheet.boards if b.name == "door").drawing.cuts[0].loop))
+    for d in found:
+        if d.text in ("400.0 mm", "600.0 mm"):
+            length = math.dist(d.start, d.end)
+            assert f"{length:.1f} mm" == d.text
+            assert outline.buffer(1e-6).covers(shapely.LineString([d.start, d.end]))
+            assert outline.covers(shapely.Point(d.at).buffer(d.height / 2))
+
+
+def test_dimensions_are_in_all_three_drawings(tmp_path):
+    paths = {p.suffix: p for p in export(stool(), tmp_path, ExportOptions(units="in"))}
+    texts = [t.dxf.text for t in ezdxf.readfile(paths[".dxf"]).modelspace().query('TEXT[layer=="DIMENSION"]')]
+    assert '96 1/16"' in texts and '15 3/4"' in texts
+    assert "96 1/16&quot;" in paths[".svg"].read_text() or '96 1/16"' in paths[".svg"].read_text()
 
 
 def test_same_bytes_twice(tmp_path):

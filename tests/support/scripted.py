@@ -61,10 +61,10 @@ def problems(source: str, **changes: float) -> list[str]:
     before = typed_contacts(*run(source))
     try:
         solids, normals = run(source, **changes)
+        after = typed_contacts(solids, normals)  # fails on a solid that lost its faces
     except (ValueError, RuntimeError, AttributeError) as error:
         return [f"does not run: {error}"]
     wrong = [f"{name} is not valid" for name, solid in solids.items() if not solid_is_valid(solid)]
-    after = typed_contacts(solids, normals)
     changed = [p for p in sorted(before.keys() | after.keys()) if before.get(p) != after.get(p)]
     wrong += [f"contact {pair} was {before.get(pair)}, is {after.get(pair)}" for pair in changed]
     shared = interference(solids)
