@@ -14,9 +14,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kerfwright import __version__
+from kerfwright.errors import ExportError
 from kerfwright.model import Model
 from kerfwright.model.io import write_model
 from kerfwright.progress import Reporter
+from kerfwright.report.cutting import CutSheet, LaidPart
 from kerfwright.report.figures import figures
 from kerfwright.report.page import report_html
 from kerfwright.versions import library_versions
@@ -34,11 +36,29 @@ def write_results(found: Reconstruction, folder: Path) -> None:
 
     model = found.model
     write_model(model, folder / "model.json")
-    page = report_html(model, found.capture_in_model, board_colours(model))
+    page = report_html(model, found.capture_in_model, board_colours(model), *_cut_sheets(model))
     (folder / "report.html").write_text(page, encoding="utf-8")
     _write_json(folder / "report.json", report(model))
     # To look at the files is how one finds out what is wrong with them; `force` stamps them NOT VERIFIED then.
     export_all(model, ("step", "dxf"), folder, force=True, findings=model.findings)
+
+
+def _cut_sheets(model: Model) -> tuple[list[CutSheet], str]:
+    """The boards on stock sheets of the usual size; or none, and why."""
+    from kerfwright_exporters.options import ExportOptions
+    from kerfwright_exporters.sheets import lay_sheets
+
+    try:
+        sheets = lay_sheets(model, ExportOptions())
+    except ExportError as error:
+        return [], str(error)
+    return [
+        CutSheet(
+            sheet.thickness, sheet.length, sheet.width, sheet.utilisation,
+            tuple(LaidPart(b.name, tuple(cut.loop for cut in b.drawing.cuts)) for b in sheet.boards),
+        )
+        for sheet in sheets
+    ], ""  # fmt: skip
 
 
 def report(model: Model) -> dict[str, Any]:

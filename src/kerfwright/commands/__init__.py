@@ -14,6 +14,7 @@ from kerfwright.commands.doctor import doctor
 from kerfwright.commands.evaluate import evaluate
 from kerfwright.commands.export import export
 from kerfwright.commands.info import info
+from kerfwright.commands.poses import poses
 from kerfwright.commands.reconstruct import reconstruct
 from kerfwright.commands.synth import synth
 from kerfwright.commands.view import view
@@ -49,5 +50,5 @@ def _common(
         context.default_map = read_config(config_path())
 
 
-for command in (reconstruct, demo, info, view, check, export, evaluate, synth, doctor, config):
+for command in (reconstruct, demo, poses, info, view, check, export, evaluate, synth, doctor, config):
     app.command()(command)

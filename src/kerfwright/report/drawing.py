@@ -13,7 +13,7 @@ import numpy as np
 from kerfwright.model import Arc, Bevel, Bezier, Board, Circle, Edge, Line, Loop
 from kerfwright.model.geometry import arc_circle, edge_end, edge_length, edge_points, edge_tangents, sample_loop
 
-__all__ = ["board_svg"]
+__all__ = ["board_svg", "loop_path"]
 
 MOST_LABELS = 16  # lengths of edges are left out of a path with more edges: they would cover it
 SMOOTH_DEGREES = 3.0  # tangents that differ by less meet smoothly, to the eye
@@ -26,7 +26,7 @@ def board_svg(board: Board) -> str:
     unit = float(max(high - low)) / 40  # height of a letter
     loops = (board.cut_path.outer, *board.cut_path.holes)
     inside = [
-        f'<path class="wood" fill-rule="evenodd" d="{" ".join(_path(loop) for loop in loops)}"/>',
+        f'<path class="wood" fill-rule="evenodd" d="{" ".join(loop_path(loop) for loop in loops)}"/>',
         *(_bevel(bevel, unit) for bevel in board.bevels),
         *(node for loop in loops for node in _nodes(loop, unit)),
         *(label for loop in loops for label in _labels(loop, unit)),
@@ -46,7 +46,8 @@ def _n(value: float) -> str:
     return f"{round(float(value), 2) + 0.0:g}" if abs(value) < 1e4 else f"{value:.2f}"
 
 
-def _path(loop: Loop) -> str:
+def loop_path(loop: Loop) -> str:
+    """A loop as the data of an SVG path, y up."""
     first = loop.edges[0]
     if isinstance(first, Circle):
         return _circle_path(first)

@@ -12,6 +12,7 @@ import numpy as np
 
 from kerfwright.model import Model
 from kerfwright.report.cards import boards_section
+from kerfwright.report.cutting import CutSheet, sheets_section
 from kerfwright.report.deviation import Deviation, deviation
 from kerfwright.report.meshes import board_meshes
 from kerfwright.report.next_views import next_views
@@ -33,7 +34,13 @@ _SCALES = {
 }
 
 
-def report_html(model: Model, capture: Capture | None, colours: Sequence[Colour]) -> str:
+def report_html(
+    model: Model,
+    capture: Capture | None,
+    colours: Sequence[Colour],
+    sheets: Sequence[CutSheet] = (),
+    sheets_problem: str = "",
+) -> str:
     """The whole page; without a capture, without photographs and distances.
 
     Raises
@@ -52,7 +59,8 @@ def report_html(model: Model, capture: Capture | None, colours: Sequence[Colour]
         f"<title>{escape(model.name)}: kerfwright</title>",
         f"<style>{(assets / 'page.css').read_text()}</style></head><body class=\"outline\">",
         _head(model), _stage(cloud, full_scale), photographs_section(views, meshes, colours),
-        boards_section(model, colours), contacts_section(model.contacts), findings_section(model.findings),
+        boards_section(model, colours), sheets_section(sheets, sheets_problem), contacts_section(model.contacts),
+        findings_section(model.findings),
         next_section(next_views(meshes, capture.views)) if capture else "", _foot(model),
         f'<script type="application/json" id="scene">{data}</script>',
         f"<script>{(assets / 'viewer.js').read_text()}</script>", "</body></html>", "",
