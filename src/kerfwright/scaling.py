@@ -86,7 +86,7 @@ def scaled_by_lengths(model: Model, lengths: Sequence[Length]) -> Model:
     given = np.array([length.value for length in lengths])
     factor = float(found @ given / (found @ found))
     residuals = factor * found - given
-    told = ", ".join(f"{n.text} ({r:+.2f})" for n, r in zip(lengths, residuals, strict=True))
+    told = ", ".join(f"{n.text} ({round(r, 2) + 0.0:+.2f})" for n, r in zip(lengths, residuals, strict=True))
     error = float(np.sqrt(residuals @ residuals / (len(given) - 1) / (found @ found))) if len(given) > 1 else None
     scale = Scale(
         millimetres_per_unit=model.scale.millimetres_per_unit * factor, origin="measured",

@@ -20,6 +20,7 @@ from kerfwright.errors import CaptureError, OptionError, OutputError
 __all__ = ["Recovered", "recover_cameras"]
 
 FEWEST = 3  # photographs
+PARTS = ("images", "sparse", "stereo")  # the last tells COLMAP which photographs its stereo is to compare
 INSTALL = "needs pycolmap: run `pip install 'kerfwright[poses]'`"
 
 
@@ -41,7 +42,7 @@ def recover_cameras(
     seed: int = 0,
     say: Callable[[str], None] = lambda text: None,
 ) -> Recovered:
-    """Write a capture's images/, undistorted, and sparse/, a COLMAP model of pinhole cameras.
+    """Write a capture's images/, undistorted, sparse/, a COLMAP model of pinhole cameras, and stereo/ for its stereo.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ def recover_cameras(
         If the capture has images or cameras already.
     """
     names = _names(photographs)
-    for name in ("images", "sparse"):
+    for name in PARTS:
         if (capture / name).exists():
             raise OutputError(f"{capture / name}: folder: is there already: give another folder for the capture")
     try:
@@ -99,8 +100,8 @@ def _mapped(
     models = colmap.incremental_mapping(database, photographs, scratch / "models")
     if not models:
         raise CaptureError(
-            f"{photographs}: photographs: {len(names)} could not be placed: overlap them more, sharp, on something with "
-            "a pattern"
+            f"{photographs}: photographs: {len(names)} could not be placed: overlap them more, sharp, on something "
+            "with a pattern"
         )
     return max(models.values(), key=lambda model: (model.num_reg_images(), model.num_points3D()))
 
@@ -111,5 +112,5 @@ def _write(colmap: ModuleType, model, photographs: Path, capture: Path, scratch:
     made = scratch / "undistorted"
     colmap.undistort_images(made, scratch / "best", photographs)
     capture.mkdir(parents=True, exist_ok=True)
-    for name in ("images", "sparse"):
+    for name in PARTS:
         shutil.move(str(made / name), str(capture / name))

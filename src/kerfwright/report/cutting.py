@@ -67,7 +67,7 @@ def _name(part: LaidPart, letter: float) -> str:
     points = sample_loop(part.loops[-1])
     (x, y), (width, height) = (points.min(axis=0) + points.max(axis=0)) / 2, np.ptp(points, axis=0)
     turn = " rotate(-90)" if height > width else ""
-    size = min(letter, 1.5 * max(width, height) / max(1, len(part.name)))
+    size = min(letter, 1.5 * max(width, height) / max(1, len(part.name)), 0.8 * min(width, height))
     return (
         f'<text class="overall" transform="translate({x:.1f},{y:.1f}) scale(1,-1){turn}" font-size="{size:.1f}" '
         f'dy="{0.35 * size:.1f}">{escape(part.name)}</text>'
