@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from build123d import Edge, Face, Keep, Plane, Shell, Solid, Vector, Wire, split
+from build123d import Edge, Face, Plane, Shell, Solid, Vector, Wire
 from OCP.BRep import BRep_Tool
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge
 from OCP.GeomConvert import GeomConvert
 
-__all__ = ["Sheet", "arc", "bezier", "board", "circle", "line", "on", "stretched"]
+__all__ = ["Sheet", "arc", "behind", "bezier", "board", "circle", "line", "on", "stretched"]
 
 
 # --- begin ---
@@ -45,6 +45,13 @@ def stretched(vector, factors) -> Vector:
 def on(plane: Plane, place: Vector) -> Vector:
     """The place moved square onto a face."""
     return place - plane.z_dir * (place - plane.origin).dot(plane.z_dir)
+
+
+def behind(plane: Plane, place: Vector, reach: float) -> Solid:
+    """All that lies behind a face, as far as it matters: a block beside the place."""
+    back = Plane(on(plane, place), z_dir=-plane.z_dir)
+    corner = back.origin - (back.x_dir + back.y_dir) * reach
+    return Solid.make_box(2 * reach, 2 * reach, reach, Plane(corner, x_dir=back.x_dir, z_dir=back.z_dir))
 
 
 def line(*end):
@@ -96,7 +103,7 @@ def board(sheet, size, drawn, outline, holes=(), lies_on=(), bevels=()) -> Solid
         solid = solid.cut(Solid(Shell([Face(ring) for ring in rings]))).solid()
     solid = solid.moved(place.location)
     for plane in lies_on:
-        solid = split(solid, bisect_by=plane, keep=Keep.TOP).solid()
+        solid = solid.cut(behind(plane, sheet.origin, 2 * sum(size))).solid()
     return solid.clean()
 
 

@@ -19,11 +19,14 @@ from kerfwright.model.geometry import edge_length, edge_start, edge_tangents, sa
 from kerfwright.solid import assembly_solids
 from kerfwright.solid.bevels import HalfSpace, bevel_bodies, polyhedron_faces
 from kerfwright.solid.faces import Shape, shape_of
+from kerfwright_exporters.extend import extended_edge
 
 __all__ = ["BoardDesign", "FreeCut", "NeighbourCut", "design_boards", "model_box"]
 
 ON_PLANE = 0.01  # mm between an outline's edge and the face that it ends on: what counts as snug
 OVERDRAW = 30.0  # mm that an outline is drawn over a face that will cut it
+RUN_ON = 3.0  # mm that a curve is drawn on past such a face
+NEARLY_STRAIGHT = 0.05  # rad of turn below which an edge is not moved out along the one that goes on from it
 PARALLEL = 1e-3  # rad between an edge and a plane along it
 
 
@@ -229,32 +232,56 @@ def _edges_on(board: Board, point: np.ndarray, normal: np.ndarray) -> set[int]:
 
 
 def _overdrawn(loop: Loop, over: set[int]) -> Loop:
-    """The outline with some straight edges moved out by OVERDRAW; curves beside them are run on straight."""
+    """The outline with some straight edges moved out by OVERDRAW; curves beside them are run on."""
     if not over:
         return loop
-    count = len(loop.edges)
-    starts = [_joint(loop, (k - 1) % count, k, over) for k in range(count)]
+    joints = _joints(loop, over, set())
+    joints = _joints(loop, over, {k for k in over if _turned_round(loop, joints, k)})
     edges: list[Edge] = []
     for k, edge in enumerate(loop.edges):
-        (_, begin), (end, _) = starts[k], starts[(k + 1) % count]
-        straight = isinstance(edge, Line)
-        points = (begin, end) if straight else (begin, edge.start)
-        edges.append(Line(start=points[0], end=points[1]))
-        edges += [] if straight else [edge, Line(start=edge.end, end=end)]
-        edges.append(Line(start=end, end=starts[(k + 1) % count][1]))
+        begin, (end, onward) = joints[k][1], joints[(k + 1) % len(joints)]
+        if isinstance(edge, Line):
+            edges.append(Line(start=begin, end=end))
+        else:
+            edge = _run_on(loop, k, over)
+            edges += [Line(start=begin, end=edge.start), edge, Line(start=edge.end, end=end)]
+        edges.append(Line(start=end, end=onward))
     return Loop(edges=tuple(e for e in edges if edge_length(e) > ON_PLANE))
 
 
-def _joint(loop: Loop, before: int, after: int, over: set[int]) -> tuple[tuple, tuple]:
-    """Where the edge before ends and the edge after starts once some edges are moved out."""
+def _run_on(loop: Loop, k: int, over: set[int]) -> Edge:
+    """A curve drawn on past the faces that cut it, so that none of its ends lies on one: OCCT cuts badly there."""
+    edge, count = loop.edges[k], len(loop.edges)
+    for neighbour, at_end in (((k - 1) % count, False), ((k + 1) % count, True)):
+        t = np.array([float(at_end)])
+        u, v = edge_tangents(edge, t)[0], edge_tangents(loop.edges[neighbour], 1 - t)[0]
+        if neighbour in over and abs(u[0] * v[1] - u[1] * v[0]) >= NEARLY_STRAIGHT:
+            edge = extended_edge(edge, RUN_ON, at_end)
+    return edge
+
+
+def _joints(loop: Loop, over: set[int], square: set[int]) -> list[tuple[tuple, tuple]]:
+    """For every corner, where the edge before it ends and the one after it starts once some edges are moved out."""
+    count = len(loop.edges)
+    return [_joint(loop, (k - 1) % count, k, over, square) for k in range(count)]
+
+
+def _turned_round(loop: Loop, joints: list[tuple[tuple, tuple]], k: int) -> bool:
+    """Whether an edge, moved out along its neighbours, runs the wrong way: they meet before they are that far out."""
+    begin, end = joints[k][1], joints[(k + 1) % len(joints)][0]
+    return float(edge_tangents(loop.edges[k], np.zeros(1))[0] @ np.subtract(end, begin)) <= ON_PLANE
+
+
+def _joint(loop: Loop, before: int, after: int, over: set[int], square: set[int]) -> tuple[tuple, tuple]:
+    """The two ends at one corner; edges in `square` are moved out square to themselves."""
     corner = np.array(edge_start(loop.edges[after]))
     if before not in over and after not in over:
         return tuple(corner), tuple(corner)
     u = edge_tangents(loop.edges[before], np.ones(1))[0]
     v = edge_tangents(loop.edges[after], np.zeros(1))[0]
     normals = np.array([[u[1], -u[0]], [v[1], -v[0]]])
-    if abs(np.linalg.det(normals)) < 0.05:  # nearly straight on: step out square to the edge
-        out = corner + OVERDRAW * normals[0 if before in over else 1]
-        return (tuple(out) if before in over else tuple(corner)), (tuple(out) if after in over else tuple(corner))
+    if {before, after} & square or abs(np.linalg.det(normals)) < NEARLY_STRAIGHT:
+        ends = (corner + OVERDRAW * n * (k in over) for n, k in zip(normals, (before, after), strict=True))
+        return tuple(tuple(map(float, end)) for end in ends)
     out = corner + np.linalg.solve(normals, [OVERDRAW * (k in over) for k in (before, after)])
     return tuple(map(float, out)), tuple(map(float, out))

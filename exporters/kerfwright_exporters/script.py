@@ -57,7 +57,7 @@ def _library() -> str:
     body = source.split("# --- begin ---\n", 1)[1].split("# --- end ---", 1)[0].rstrip()
     head = (
         "from dataclasses import dataclass\n\n"
-        "from build123d import Compound, Edge, Face, Keep, Plane, Shell, Solid, Vector, Wire, export_step, split\n"
+        "from build123d import Compound, Edge, Face, Plane, Shell, Solid, Vector, Wire, export_step\n"
         "from OCP.BRep import BRep_Tool\n"
         "from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge\n"
         "from OCP.GeomConvert import GeomConvert\n\n\n"
@@ -79,7 +79,7 @@ def identifiers(model: Model) -> list[str]:
 
 
 _TAKEN = frozenset(
-    ("arc", "assembly", "bezier", "board", "circle", "dataclass", "line", "on", "split", "stretched", "wire")
+    ("arc", "assembly", "behind", "bezier", "board", "circle", "dataclass", "line", "on", "stretched", "wire")
 )
 
 
