@@ -3,7 +3,6 @@
 import xml.etree.ElementTree as ET
 
 import simple
-
 from kerfwright.report.cutting import CutSheet, LaidPart, sheets_section
 
 

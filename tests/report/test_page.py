@@ -27,6 +27,7 @@ from kerfwright.model import (
     Quantity,
     Scale,
 )
+from kerfwright.report.cutting import CutSheet, LaidPart
 from kerfwright.report.page import report_html
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
@@ -77,6 +78,9 @@ MODEL = Model(
     ),
     provenance=Provenance(version="1.2", capture="c", images=2, points=900),
 )
+
+
+SHEETS = (CutSheet(18, 2440, 1220, 0.03, (LaidPart("left", (MODEL.boards[0].cut_path.outer,)),)),)
 
 
 @pytest.fixture
@@ -173,6 +177,22 @@ def test_what_to_photograph_next(capture):
     text = Page(report_html(MODEL, capture, COLOURS)).text
     assert "Photograph these next" in text, "two photographs of three boards don't show all"
     assert re.search(r"\d+° to the (right|left) of [01]\.png", text)
+    assert "Take two or three from each place" in text
+
+
+def test_cut_sheets_or_why_there_are_none(capture):
+    text = Page(report_html(MODEL, capture, COLOURS, SHEETS)).text
+    assert "Cut sheets" in text and "2440 × 1220 × 18.0 mm: 1 board, 3 % used" in text
+    assert "board 'left' does not fit" in Page(report_html(MODEL, None, COLOURS, (), "board 'left' does not fit")).text
+    assert "Cut sheets" not in Page(report_html(MODEL, None, COLOURS)).text
+
+
+@pytest.mark.parametrize("origin", ["assumed", "given", "file", "measured", "inferred"])
+def test_where_the_scale_is_from(origin):
+    model = MODEL.model_copy(update={"scale": Scale(millimetres_per_unit=7.5, origin=origin, note="From a tape.")})
+    text = Page(report_html(model, None, COLOURS)).text
+    words = {"file": "of the cloud's format", "inferred": "guessed from the boards"}.get(origin, origin)
+    assert re.search(rf"1 capture unit = 7.5 mm, {words}[^.]*\. From a tape\.", text)
 
 
 def test_without_a_capture_it_shows_the_model_alone():
@@ -219,7 +239,21 @@ window.addEventListener("load", () => drawn(() => {
     document.getElementById("blend").value = 0.25;
     document.getElementById("blend").dispatchEvent(new Event("input"));
     say.opacity = document.querySelector(".layers img + img").style.opacity;
-    document.title = JSON.stringify(say);
+    say.stock = [...document.querySelectorAll(".sheets svg .stock")].map((r) => r.getBoundingClientRect().width > 100);
+    say.headings = [...document.querySelectorAll("h2")].map((h) => h.textContent);
+    const cloud = document.getElementById("cloud");
+    const plain = colours().sum;
+    cloud.checked = true; cloud.dispatchEvent(new Event("input"));
+    const blink = document.getElementById("blink");
+    blink.checked = true;
+    const seen = new Set();
+    const watch = setInterval(() => seen.add(document.querySelector(".layers img + img").style.opacity), 60);
+    drawn(() => { say.deviation = colours().sum !== plain; });
+    setTimeout(() => {
+      clearInterval(watch);
+      say.blinks = [...seen].sort();
+      document.title = JSON.stringify(say);
+    }, 1800);
   });
 }));
 </script>
@@ -229,7 +263,7 @@ window.addEventListener("load", () => drawn(() => {
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here")
 def test_it_runs_in_a_browser(capture, tmp_path):
     page = tmp_path / "report.html"
-    page.write_text(report_html(MODEL, capture, COLOURS).replace("</body>", PROBE + "</body>"))
+    page.write_text(report_html(MODEL, capture, COLOURS, SHEETS).replace("</body>", PROBE + "</body>"))
     done = subprocess.run(
         [
             CHROMIUM,
@@ -261,6 +295,11 @@ def test_it_runs_in_a_browser(capture, tmp_path):
     assert said["exploded"] != said["first"], "the slider moves them"
     assert said["chosen"] in [b.name for b in MODEL.boards] and said["card"] == 1, "a click chooses a board"
     assert said["body"] == "shaded" and said["opacity"] == "0.25"
+    assert said["stock"] == [True] and said["deviation"], "sheets are drawn; the cloud's distances colour the view"
+    assert {"0", "1"} <= set(said["blinks"]), "the drawing comes and goes"
+    assert said["headings"] == [
+        "Assembly", "Over the photographs", "Boards", "Cut sheets", "Contacts", "Findings", "Photograph these next",
+    ]  # fmt: skip
 
 
 def test_assets_ship_with_the_package():

@@ -31,5 +31,5 @@ def poses(
     found = recover_cameras(photographs, out, one_camera=not several, seed=seed, say=say)
     say(
         f"{found.placed} of {found.photographs} photographs are placed, {found.points} points, {found.error:.2f} pixels "
-        f"off on average.\nThe capture still needs its cloud, {out / 'cloud.ply'}: see docs/tutorial.md, The cloud."
+        f"off.\nThe capture still needs its cloud, {out / 'cloud.ply'}: see docs/tutorial.md, The cloud."
     )

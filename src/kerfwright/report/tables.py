@@ -45,7 +45,10 @@ def next_section(views: Sequence[NextView]) -> str:
         f"{100 * view.share:.0f}", ", ".join(view.boards),
     ) for view in views]
     head = ("stand", "degrees above the floor", "metres from the middle", "% more of the surface", "of boards")
-    return _table("Photograph these next", head, rows, numbers=(1, 2, 3)) if rows else ""
+    if not rows:
+        return ""
+    advice = "Take two or three from each place, a step apart: a point must be in two to be measured."
+    return _table("Photograph these next", head, rows, numbers=(1, 2, 3)) + f'<p class="sum">{advice}</p>'
 
 
 def _side(turn: float) -> str:
