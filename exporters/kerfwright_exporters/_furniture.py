@@ -9,7 +9,7 @@ from OCP.BRep import BRep_Tool
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge
 from OCP.GeomConvert import GeomConvert
 
-__all__ = ["Sheet", "arc", "behind", "bezier", "board", "circle", "line", "on", "stretched"]
+__all__ = ["Sheet", "arc", "behind", "bezier", "board", "circle", "line", "on", "squared", "stretched"]
 
 
 # --- begin ---
@@ -45,6 +45,15 @@ def stretched(vector, factors) -> Vector:
 def on(plane: Plane, place: Vector) -> Vector:
     """The place moved square onto a face."""
     return place - plane.z_dir * (place - plane.origin).dot(plane.z_dir)
+
+
+def squared(plane: Plane, sheet: Sheet) -> Plane:
+    """The face, square to the sheet if it all but is: by a few micrometres, and OCCT fails at slants that small."""
+    slant = plane.z_dir.dot(sheet.normal)
+    if abs(slant) > 4e-4:
+        return plane
+    middle = sheet.origin + sheet.normal * ((0.5 - sheet.below) * sheet.thickness)
+    return Plane(on(plane, middle), z_dir=plane.z_dir - sheet.normal * slant)
 
 
 def behind(plane: Plane, place: Vector, reach: float) -> Solid:
@@ -103,7 +112,8 @@ def board(sheet, size, drawn, outline, holes=(), lies_on=(), bevels=()) -> Solid
         solid = solid.cut(Solid(Shell([Face(ring) for ring in rings]))).solid()
     solid = solid.moved(place.location)
     for plane in lies_on:
-        solid = solid.cut(behind(plane, sheet.origin, 2 * sum(size))).solid()
+        pieces = solid.cut(behind(squared(plane, sheet), sheet.origin, 2 * sum(size))).solids()
+        solid = max(pieces, key=lambda piece: piece.volume)
     return solid.clean()
 
 

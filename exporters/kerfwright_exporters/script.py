@@ -79,7 +79,20 @@ def identifiers(model: Model) -> list[str]:
 
 
 _TAKEN = frozenset(
-    ("arc", "assembly", "behind", "bezier", "board", "circle", "dataclass", "line", "on", "stretched", "wire")
+    (
+        "arc",
+        "assembly",
+        "behind",
+        "bezier",
+        "board",
+        "circle",
+        "dataclass",
+        "line",
+        "on",
+        "squared",
+        "stretched",
+        "wire",
+    )
 )
 
 

@@ -3,15 +3,16 @@
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from kerfwright.errors import ExportError
-from kerfwright.model import Model
+from kerfwright.model import Arc, Line, Loop, Model
 from kerfwright.solid import assembly_solids
 from kerfwright_exporters import ExportOptions
 from kerfwright_exporters.script import export, identifiers
 from scripted import dimensions, interference, problems, run, typed_contacts
-from simple import bevel, board, rectangle, stool
+from simple import bevel, board, placed, rectangle, stool
 from truths import AVAILABLE, truth_model
 
 truths = pytest.mark.skipif(not AVAILABLE, reason="the captures with truth are not on this machine")
@@ -73,6 +74,27 @@ def test_bevels_that_no_whole_plane_can_cut_are_cut_where_they_are(tmp_path):
     solids, _ = run(source, STOCK_18=20.0)
     thicker = board(angle, "angle", 20.0, bevels=(inner, outer))
     assert solids["angle"].volume == pytest.approx(assembly_solids(Model(boards=(thicker,)))[0][1].volume, rel=1e-9)
+
+
+@pytest.mark.parametrize("height", [360.0, 398.0, 440.0])
+def test_legs_that_lean_by_a_hair_are_still_cut(height, tmp_path):
+    """OCCT leaves a round side whole where the cut slants by a ten thousandth of a radian."""
+    sides = (Arc(start=(380, 0), mid=(190, -9), end=(0, 0)), Line(start=(0, 0), end=(0, 300)))
+    sides = tuple(e.model_copy(update={"start": e.end, "end": e.start, **_middle(e)}) for e in reversed(sides))
+    outline = Loop(edges=(*sides, Line(start=(380, 0), end=(380, 300)), Line(start=(380, 300), end=(0, 300))))
+    turn = 1e-4
+    model = stool()
+    legs = [
+        board(outline, leg.name, 18.0, placed((turn, 0, np.sqrt(1 - turn**2)), (0, 1, 0), (x, 0, 0)))
+        for leg, x in zip(model.boards[1:], (68.0, 350.0), strict=True)
+    ]
+    model = model.model_copy(update={"boards": (model.boards[0], *legs)})
+    source = program(model, tmp_path)
+    assert problems(source, HEIGHT=dimensions(source)["HEIGHT"] * height / 398) == []
+
+
+def _middle(edge) -> dict:
+    return {"mid": edge.mid} if isinstance(edge, Arc) else {}
 
 
 def test_it_runs_by_itself_without_kerfwright(tmp_path):
