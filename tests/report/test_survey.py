@@ -74,3 +74,17 @@ def test_the_shipped_capture_is_enough():
     found = survey(prepare(open_capture(demo_capture()))).findings
     warnings = [f.code for f in found if f.severity != "info"]
     assert warnings == ["K003"], "its scale is assumed, and nothing else is amiss"
+
+
+def test_cameras_of_other_photographs_are_a_finding():
+    from dataclasses import replace
+
+    from kerfwright.capture import open_capture, prepare
+    from kerfwright.demo import demo_capture
+
+    capture = prepare(open_capture(demo_capture()))
+    assert survey(capture).fitting_share == 1.0
+    others = (*capture.views[4:], *capture.views[:4])
+    mixed = tuple(replace(v, camera_from_world=o.camera_from_world) for v, o in zip(capture.views, others, strict=True))
+    found = survey(replace(capture, views=mixed))
+    assert found.fitting_share < 0.4 and "K025" in [f.code for f in found.findings]

@@ -53,6 +53,8 @@ def _page(found: Survey) -> str:
         f"resolution    {found.pixel_mm:.2f} mm a pixel",
         f"plain         {100 * found.plain_share:.0f} % of the surface shows little texture",
     ]
+    if found.fitting_share is not None:
+        lines.append(f"fit           the cloud lies where {100 * found.fitting_share:.0f} % of the photographs show it")
     lines += [f"{f.severity:<8} {f.code} {f.message}" + (f": {f.remedy}" if f.remedy else "") for f in found.findings]
     enough = not any(f.severity == "warning" and f.code != "K003" for f in found.findings)
     return "\n".join([*lines, "This is enough." if enough else "This may not be enough: see the warnings."])
