@@ -128,7 +128,7 @@ def test_without_the_library_the_remedy_is_told(tmp_path, monkeypatch):
 
     monkeypatch.setitem(sys.modules, "laspy", None)
     (tmp_path / "cloud.las").write_bytes(b"LASF" + bytes(400))
-    with pytest.raises(CaptureError, match=r"cloud\.las: file: needs laspy: run `pip install 'kerfwright\[clouds\]'`"):
+    with pytest.raises(CaptureError, match=r"cloud\.las: file: needs laspy: run `pip install 'laspy\[lazrs\]'`"):
         read_las(tmp_path / "cloud.las")
 
 

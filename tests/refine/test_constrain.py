@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from shapely.geometry import Polygon, box
 
+from kerfwright.assemble.outlines import constrained_region
 from kerfwright.assemble.types import ConstraintSegment
-from kerfwright.refine.constrain import constrained_region, outline_region, to_loops
+from kerfwright.refine.constrain import outline_region, to_loops
 from kerfwright.refine.types import BoundaryLoop, Outline
 
 REACH, BEYOND = 20.0, 25.0

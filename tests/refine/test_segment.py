@@ -129,7 +129,7 @@ def test_pointed_end_stops_at_the_point() -> None:
 
 def test_board_is_run_on_to_its_contact_only() -> None:
     mask = GRID.mask(box(-10, -10, 20, 20))
-    contact, cut_plane = segment((40, -5), (40, 15)), segment((-15, 15), (-15, -5), origin="cut_plane")
+    contact, cut_plane = segment((40, -5), (40, 15)), segment((-15, 15), (-15, -5), origin="seam")
     filled = fill_to_contacts(mask, limits_of([contact, cut_plane], 10, 5), GRID, 60)
     assert (filled == mask | GRID.mask(box(19, -5, 40, 15))).all()
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.assemble.types import Assembly, ConstraintSegment
 from kerfwright.capture.types import Capture
-from kerfwright.identify.types import Parts
+from kerfwright.identify.types import Parts, Sheet
 
 __all__ = ["AssembleOptions", "Assembly", "ConstraintSegment", "assemble"]
 
@@ -16,17 +18,46 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     Raises StageError when the alignment does not converge.
     """
     from kerfwright.assemble.align import align_sheets
+    from kerfwright.assemble.backs import measured_backs
     from kerfwright.assemble.constraints import constraint_segments
     from kerfwright.assemble.contacts import find_contacts, to_contact
+    from kerfwright.assemble.gaps import mended
     from kerfwright.assemble.stock import share_thickness
+    from kerfwright.assemble.veils import still_open, unveiled
     from kerfwright.identify.freespace import see_through
     from kerfwright.identify.photo_edges import Photos
 
     options = options or AssembleOptions()
     diameter = capture.cloud.diameter
     sheets, _ = align_sheets(parts.sheets, capture.cloud, options)
-    sheets = share_thickness(sheets, diameter, options)
+    photos = Photos(capture)
+    edges: tuple[tuple[ConstraintSegment, ...], ...] = tuple(() for _ in sheets)
+    if options.rough:
+        sheets, edges = unveiled(sheets, capture.cloud, photos, options)
+    sheets = measured_backs(sheets, photos, diameter, options)
     free = see_through(capture, parts.spacing, max(5 * parts.noise, diameter / 150))
-    decided = find_contacts(sheets, capture.cloud, Photos(capture), free, options)
+    sheets = mended(sheets, capture.cloud, free, options)
+    sheets = share_thickness(sheets, diameter, options)
+    for _ in range(options.passes):
+        decided = find_contacts(sheets, capture.cloud, photos, free, options)
+        segments = constraint_segments(sheets, decided, diameter, options)
+        filled = _run_on(sheets, segments, options.far_reach * diameter)
+        if all(a.region.equals(b.region) for a, b in zip(sheets, filled, strict=True)):
+            break
+        sheets = filled
     contacts = tuple(to_contact(d, sheets) for d in decided)
-    return Assembly(sheets, contacts, constraint_segments(sheets, decided, diameter, options))
+    edges = still_open(edges, segments)
+    return Assembly(sheets, contacts, tuple(a + b for a, b in zip(segments, edges, strict=True)))
+
+
+def _run_on(
+    sheets: tuple[Sheet, ...], constraints: tuple[tuple[ConstraintSegment, ...], ...], reach: float
+) -> tuple[Sheet, ...]:
+    """The sheets with their regions run on to what they end on: what stereo lost in the dark between them comes back.
+    """
+    from kerfwright.assemble.outlines import filled_region
+
+    return tuple(
+        replace(sheet, region=filled_region(sheet.region, segments, reach))
+        for sheet, segments in zip(sheets, constraints, strict=True)
+    )

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 from scipy.spatial import cKDTree
 
 from kerfwright.assemble.joints import Joint, Search, end_on, face_plane
 from kerfwright.assemble.options import AssembleOptions
-from kerfwright.assemble.seams import Seam, look_for_end, look_for_seam
+from kerfwright.assemble.seams import End, Seam, look_for_end, look_for_seam
 from kerfwright.assemble.visibility import Obstacles
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.freespace import FreeSpace
@@ -20,6 +21,8 @@ from kerfwright.model import Contact, ContactEvidence
 __all__ = ["Decided", "find_contacts", "to_contact"]
 
 LEAST_SEAM = 1.35  # a visible seam is at least this much stronger than the face beside it
+LEAST_VIEWS = 3  # photographs that must show an edge for it to decide anything
+MOST_SPOILT = 0.3  # of a gap may be seen through, or taken by another board
 CLEAR_MARGIN = 1.25  # ratio of seam scores from which a corner counts as decided by the photographs
 
 
@@ -53,7 +56,8 @@ class _Scene:
         """Where joints are looked for when a's wood may go on so far (a fraction of D) beyond its outline."""
         o = self.options
         return Search(
-            self.mm(o.far_reach), self.mm(o.outline_error), self.mm(cover), self.mm(1 / 200), self.mm(o.min_contact)
+            self.mm(o.far_reach), self.mm(o.outline_error), self.mm(cover), self.mm(1 / 200), self.mm(o.min_contact),
+            self.mm(o.ragged),
         )
 
 
@@ -119,19 +123,36 @@ def _unfinished(scene: _Scene, joint: Joint | None) -> Joint | None:
     options = scene.options
     if joint is None or joint.gap > scene.mm(options.unseen_reach) or joint.length < scene.mm(options.reach):
         return None
-    if _end_is_seen(scene, joint) or _gap_is_free(scene, joint):
+    if _end_is_seen(scene, joint) or _gap_is_free(scene, joint) or _gap_is_taken(scene, joint):
         return None
-    return joint
+    end = _end(scene, joint)
+    return None if end is not None and _ends_before(end, options) else joint
 
 
 def _gap_is_free(scene: _Scene, joint: Joint) -> bool:
     """Whether cameras saw through the place between b's outline and the plane."""
+    return float((scene.free.votes(_gap_places(scene, joint)) >= 2).mean()) > MOST_SPOILT
+
+
+def _gap_is_taken(scene: _Scene, joint: Joint) -> bool:
+    """Whether another board lies between b's outline and the plane."""
+    places = _gap_places(scene, joint)
+    taken = np.zeros(len(places), bool)
+    for k, sheet in enumerate(scene.sheets):
+        if k not in (joint.a, joint.b):
+            x = sheet.to_board(places)
+            inside = (x[:, 2] > 0) & (x[:, 2] < sheet.thickness.value)
+            taken[inside] |= shapely.contains_xy(sheet.region, x[inside, 0], x[inside, 1])
+    return float(taken.mean()) > MOST_SPOILT
+
+
+def _gap_places(scene: _Scene, joint: Joint) -> np.ndarray:
+    """Places (N, 3) in the part of b that nobody saw, world."""
     b = scene.sheets[joint.b]
     inside, along = joint.trace.coordinates(joint.ends)
     layers = [joint.trace.place(share * inside, along) for share in (0.2, 0.4, 0.6, 0.8)]
     heights = b.thickness.value * np.array([0.3, 0.7])
-    places = np.concatenate([np.c_[xy, np.full(len(xy), z)] for xy in layers for z in heights])
-    return float((scene.free.votes(b.to_world(places)) >= 2).mean()) > 0.3
+    return b.to_world(np.concatenate([np.c_[xy, np.full(len(xy), z)] for xy in layers for z in heights]))
 
 
 def _is_contact(scene: _Scene, joint: Joint, reverse: Joint | None) -> bool:
@@ -146,7 +167,7 @@ def _is_contact(scene: _Scene, joint: Joint, reverse: Joint | None) -> bool:
     if overlapping and reverse is not None:
         return True
     faces = [_outer_face(scene, joint)] if overlapping else ["top", "bottom"]
-    shown = [s for s in (_seam(scene, joint, face) for face in faces) if s.views >= 3]
+    shown = [s for s in (_seam(scene, joint, face) for face in faces) if s.views >= LEAST_VIEWS]
     return not shown or max(s.score for s in shown) > LEAST_SEAM
 
 
@@ -155,17 +176,26 @@ def _seam(scene: _Scene, joint: Joint, face: str) -> Seam:
 
 
 def _confirmed(scene: _Scene, joint: Joint | None) -> Decided | None:
-    """A far joint that the photographs confirm: the first strong edge beyond the outline is at the plane."""
+    """A far joint that the photographs confirm: an edge at the plane, and no clearer one before it."""
     if joint is None or joint.length < scene.mm(scene.options.reach):
         return None
-    if _end_is_seen(scene, joint) or _gap_is_free(scene, joint):
+    if _end_is_seen(scene, joint) or _gap_is_free(scene, joint) or _gap_is_taken(scene, joint):
         return None
-    end = look_for_end(scene.sheets, joint, scene.photos, scene.obstacles, scene.mm(1 / 300))
-    if end is None or end.views < 3 or end.score < scene.options.end_score:
-        return None
-    if abs(end.offset) > scene.mm(scene.options.end_offset):
+    end = _end(scene, joint)
+    if end is None or end.views < LEAST_VIEWS or end.excess < scene.options.end_excess or _ends_before(end, scene.options):
         return None
     return Decided(joint, 1, None, ContactEvidence(seam_score=end.score, views=end.views, decided_by="seam"))
+
+
+def _end(scene: _Scene, joint: Joint) -> End | None:
+    window, fringe = scene.mm(scene.options.end_offset), scene.mm(scene.options.veil)
+    return look_for_end(scene.sheets, joint, scene.photos, scene.obstacles, window, fringe)
+
+
+def _ends_before(end: End, options: AssembleOptions) -> bool:
+    """Whether the photographs show an edge before the plane that is clear, and clearer than the one at the plane."""
+    clear = end.views >= LEAST_VIEWS and end.rival_excess > 2 * options.end_excess
+    return clear and end.rival_score > max(options.rival_score, end.score)
 
 
 def _corner(scene: _Scene, first: Joint, second: Joint) -> Decided:

@@ -14,6 +14,10 @@ from shapely.geometry import Polygon
 
 from kerfwright.identify.types import Sheet
 
+LEAST_SURE = 0.3  # of an interface: columns that end where most do
+
+LEAST_SURE = 0.3  # of an interface: columns that end where most do
+
 __all__ = ["Joint", "Search", "Trace", "columns", "end_on", "face_plane", "runs_of", "trace_of"]
 
 
@@ -79,7 +83,8 @@ class Joint:
 @dataclass(frozen=True)
 class Search:
     """Where a joint is looked for, mm: how far b's outline may be from the plane, how wrong outlines are, how far
-    beyond its outline a may have wood, the width of a column, and the shortest interface.
+    beyond its outline a may have wood, the width of a column, the shortest interface, and by how much b's outline may
+    be worse than usual where it is dark.
     """
 
     reach: float
@@ -87,6 +92,7 @@ class Search:
     cover: float
     step: float
     shortest: float
+    ragged: float = 0.0
 
 
 def end_on(sheets: tuple[Sheet, ...], a: int, b: int, search: Search) -> Joint | None:
@@ -94,6 +100,11 @@ def end_on(sheets: tuple[Sheet, ...], a: int, b: int, search: Search) -> Joint |
     found = [_end_on_face(sheets, a, b, face, search) for face in ("top", "bottom")]
     found = [j for j in found if j is not None]
     return max(found, key=lambda j: (round(j.length), -abs(j.gap))) if found else None
+
+
+def _share(along: np.ndarray, flags: np.ndarray, run: tuple[float, float]) -> float:
+    inside = (along >= run[0]) & (along <= run[1])
+    return float(flags[inside].mean()) if inside.any() else 0.0
 
 
 def face_plane(sheet: Sheet, face: str) -> tuple[np.ndarray, float]:
@@ -112,12 +123,16 @@ def _end_on_face(sheets: tuple[Sheet, ...], a: int, b: int, face: str, search: S
     if not len(along):
         return None
     hidden = one.thickness.value / trace.sine + slack
-    ends = (first > -hidden) & (first < reach) & (last > reach / 2)
+    ends = (first > -hidden) & (first < reach) & (last > np.maximum(first, 0.0) + 2 * slack)
     ends &= _has_wood(one, other, trace, along, search.cover)
     if not ends.any():
         return None
-    ends &= first < 2 * max(float(np.median(first[ends])), 0.0) + slack  # deeper columns end beside a, not before it
-    intervals = runs_of(along, ends, step, search.shortest, joining=max(slack, 2 * step))
+    usual = max(float(np.median(first[ends])), 0.0)
+    sure = ends & (first < 2 * usual + slack)  # deeper columns end beside a, not before it
+    ends &= first < 2 * usual + max(slack, search.ragged)  # but next to sure ones they are just badly traced
+    # an outline that stops far short of the plane is ragged: what lies between two of its columns ends there as well
+    runs = runs_of(along, ends, step, search.shortest, joining=max(slack, 2 * step, usual / 2))
+    intervals = tuple(run for run in runs if _share(along, sure, run) > LEAST_SURE)
     if not intervals:
         return None
     inside = np.zeros(len(along), bool)

@@ -15,8 +15,9 @@ from kerfwright.assemble.visibility import Obstacles
 from kerfwright.identify.photo_edges import Photos, SweepResult, sweep_edge
 from kerfwright.identify.types import Sheet
 
-__all__ = ["Seam", "look_for_end", "look_for_seam"]
+__all__ = ["End", "Seam", "look_for_end", "look_for_seam", "sweep_line"]
 
+LAYER = 25.0  # mm of a sweep that one test of what hides it stands for
 # a seam that no photograph shows: less than any clear seam, more than a clear face (paper: low, not zero)
 UNSEEN_SCORE = 1.5
 
@@ -30,12 +31,27 @@ class Seam:
     offset: float = 0.0  # mm from the expected place
 
 
+@dataclass(frozen=True)
+class End:
+    """The edge at the plane where a board may end, and the strongest edge before it.
+
+    score: strength in units of the median; excess: share of stretches and views that show it, less the median's.
+    """
+
+    score: float
+    views: int
+    excess: float
+    rival_offset: float  # mm inside the plane
+    rival_score: float
+    rival_excess: float
+
+
 def look_for_seam(
     sheets: tuple[Sheet, ...], joint: Joint, face: str, photos: Photos, obstacles: Obstacles, window: float
 ) -> Seam:
     """Score of the line on a sheet face of b in which the joint's plane cuts it. window: mm that the line may be off.
     """
-    sweep = _sweep(sheets[joint.b], joint, face, photos, obstacles, -8 * window, 8 * window)
+    sweep = sweep_line(sheets[joint.b], joint, face, photos, obstacles, -8 * window, 8 * window)
     if sweep is None:
         return Seam(UNSEEN_SCORE, 0)
     near = np.abs(sweep.offsets) <= window
@@ -45,27 +61,42 @@ def look_for_seam(
 
 
 def look_for_end(
-    sheets: tuple[Sheet, ...], joint: Joint, photos: Photos, obstacles: Obstacles, window: float
-) -> Seam | None:
-    """Whether b, whose outline stops short of a, is seen to run on up to it: the strongest edge from there on is at the
-    plane itself.
+    sheets: tuple[Sheet, ...], joint: Joint, photos: Photos, obstacles: Obstacles, window: float, fringe: float
+) -> End | None:
+    """Whether b, whose outline stops short of a, is seen to run on up to it: an edge that most stretches and views show
+    at the plane, and no clearer one before it.
 
-    None when no photograph shows the place.
+    window: mm that the edge may be off; fringe: mm by which the outline may be too large. None when no photograph
+    shows the place.
     """
     found = []
     for face in ("top", "bottom"):
-        sweep = _sweep(sheets[joint.b], joint, face, photos, obstacles, -2 * window, joint.gap + 4 * window)
+        sweep = sweep_line(
+            sheets[joint.b], joint, face, photos, obstacles, -4 * window, joint.gap + fringe, 0.5 * window
+        )
         if sweep is not None:
-            strength = sweep.strength / np.median(sweep.strength)
-            k = int(np.argmax(strength))
-            found.append(Seam(float(strength[k]), sweep.views, float(sweep.offsets[k])))
-    return max(found, key=lambda s: s.score * np.sqrt(s.views)) if found else None
+            found.append(_end(sweep, window))
+    return max(found, key=lambda e: (e.excess, e.views)) if found else None
 
 
-def _sweep(
+def _end(sweep: SweepResult, window: float) -> End:
+    strength = sweep.strength / np.median(sweep.strength)
+    excess = sweep.persistence - np.median(sweep.persistence)
+    near = np.abs(sweep.offsets) <= window
+    k = int(np.argmax(np.where(near, strength * np.maximum(excess, 0.0), -np.inf)))
+    before = sweep.offsets > 2 * window
+    rival = int(np.argmax(np.where(before, strength, -np.inf)))
+    return End(
+        float(strength[k]), sweep.views, float(excess[k]), float(sweep.offsets[rival]), float(strength[rival]),
+        float(excess[rival]),
+    )
+
+
+def sweep_line(
     board: Sheet, joint: Joint, face: str, photos: Photos, obstacles: Obstacles, low: float, high: float,
     step: float | None = None,
 ) -> SweepResult | None:
+    """The joint's line on a face of the board, swept from `low` to `high` mm into the wood."""
     height = board.thickness.value if face == "top" else 0.0
     step = step or (high - low) / 160
     shift = joint.trace.slope * (height - joint.trace.depth)
@@ -73,6 +104,10 @@ def _sweep(
     line = joint.trace.place(np.full(len(along), shift), along)
     places = board.to_world(np.c_[line, np.full(len(line), height)])
     direction = board.world_from_board[:3, :2] @ joint.trace.m
+    offsets = np.arange(low, high, step)
     outward = board.normal if face == "top" else -board.normal
-    visible = obstacles.visible(photos.views, places + 0.5 * (low + high) * direction, outward)
-    return sweep_edge(photos, places, direction, np.arange(low, high, step), visible, smoothing=max(0.35, 1.5 * step))
+    layers = np.linspace(low, high, max(1, int((high - low) / LAYER)) + 2)[1:-1]
+    shown = [obstacles.visible(photos.views, places + at * direction, outward) for at in layers]
+    nearest = np.abs(offsets[:, None] - layers).argmin(axis=1)
+    visible = np.stack(shown, axis=-1)[:, :, nearest] if len(layers) > 1 else shown[0]
+    return sweep_edge(photos, places, direction, offsets, visible, smoothing=max(0.35, 1.5 * step))

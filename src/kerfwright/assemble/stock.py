@@ -12,7 +12,7 @@ from kerfwright.assemble.options import AssembleOptions
 from kerfwright.identify.types import Sheet
 from kerfwright.model import Origin, Quantity
 
-__all__ = ["share_thickness"]
+__all__ = ["share_thickness", "with_thickness"]
 
 
 def share_thickness(sheets: tuple[Sheet, ...], diameter: float, options: AssembleOptions) -> tuple[Sheet, ...]:
@@ -32,13 +32,13 @@ def share_thickness(sheets: tuple[Sheet, ...], diameter: float, options: Assembl
         mean, spread = float(np.average(value[group], weights=weight)), float(weight.sum() ** -0.5)
         origin = Origin.SHARED if len(group) > 1 else Origin.MEASURED
         for k in group:
-            out[k] = _with_thickness(sheets[k], Quantity(value=mean, standard_error=spread, origin=origin))
+            out[k] = with_thickness(sheets[k], Quantity(value=mean, standard_error=spread, origin=origin))
     if groups:
         common = max(groups, key=lambda g: area[g].sum())
         guess = out[common[0]].thickness.value
         for k in np.flatnonzero(~seen):
             unsure = Quantity(value=guess, standard_error=0.3 * guess, origin=Origin.INFERRED)
-            out[k] = _with_thickness(sheets[k], unsure)
+            out[k] = with_thickness(sheets[k], unsure)
     return tuple(out)
 
 
@@ -57,7 +57,8 @@ def _clusters(members: np.ndarray, value: np.ndarray, error: np.ndarray, sigmas:
     return groups
 
 
-def _with_thickness(sheet: Sheet, thickness: Quantity) -> Sheet:
+def with_thickness(sheet: Sheet, thickness: Quantity) -> Sheet:
+    """The sheet with another thickness; its top stays where it is."""
     board = sheet.world_from_board.copy()
     board[:3, 3] += (sheet.thickness.value - thickness.value) * sheet.normal
     return replace(sheet, world_from_board=board, thickness=thickness)

@@ -23,7 +23,7 @@ class ConstraintSegment:
 
     start: np.ndarray  # (2,)
     end: np.ndarray  # (2,)
-    origin: Literal["contact", "corner", "ground", "cut_plane"]
+    origin: Literal["contact", "corner", "ground", "photo"]
     standard_error: float  # of its position across itself, mm
     normal: np.ndarray | None = None  # (3,) outward normal of the cut face, board frame; None for a square cut
     depth: float = 0.0  # z at which the line start-end lies on the cut face; matters when it is slanted

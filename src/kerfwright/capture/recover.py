@@ -1,4 +1,4 @@
-"""Cameras from photographs alone, by COLMAP's Python package: `pip install 'kerfwright[poses]'`.
+"""Cameras from photographs alone, by COLMAP's Python package, which is installed on wish: the extra `poses`.
 
 Schönberger and Frahm, Structure-from-Motion Revisited, CVPR 2016. What is left is stereo: the cloud. COLMAP's own needs
 an NVIDIA card; docs/tutorial.md has the commands for it and for other programs.
@@ -21,7 +21,7 @@ __all__ = ["Recovered", "recover_cameras"]
 
 FEWEST = 3  # photographs
 PARTS = ("images", "sparse", "stereo")  # the last tells COLMAP which photographs its stereo is to compare
-INSTALL = "needs pycolmap: run `pip install 'kerfwright[poses]'`"
+INSTALL = "needs pycolmap: run `pip install 'pycolmap>=3.11,<5'`"
 
 
 @dataclass(frozen=True)

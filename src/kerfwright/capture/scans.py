@@ -1,4 +1,4 @@
-"""Read LAS and LAZ with laspy, and E57 with pye57: both come with `pip install 'kerfwright[clouds]'`."""
+"""Read LAS and LAZ with laspy, and E57 with pye57, which are installed on wish: the extra `clouds`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from kerfwright.errors import CaptureError
 
 __all__ = ["read_e57", "read_las"]
 
-INSTALL = "run `pip install 'kerfwright[clouds]'`, or export the cloud as PLY"
+PACKAGES = {"laspy": "laspy[lazrs]", "pye57": "pye57"}
 LAS_MARK, E57_MARK = b"LASF", b"ASTM-E57"
 LEAST_RECORD = 54  # bytes of the head of a variable length record
 BEST_COMPRESSION = 200  # times, of LAZ; points of a real cloud come to a tenth of that
@@ -51,7 +51,8 @@ def _guarded(path: Path, mark: bytes, module: str, read: Callable[[ModuleType, P
     try:
         library = import_module(module)
     except ImportError as error:
-        raise capture_error(path, "file", f"needs {module}", INSTALL) from error
+        remedy = f"run `pip install '{PACKAGES[module]}'`, or export the cloud as PLY"
+        raise capture_error(path, "file", f"needs {module}", remedy) from error
     try:
         return read(library, path)
     except (CaptureError, KeyboardInterrupt, SystemExit):

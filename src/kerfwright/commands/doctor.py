@@ -26,6 +26,12 @@ _MODULES = (
     ("ezdxf", "ezdxf", "DXF"),
     ("kerfwright_exporters", "kerfwright's exporters", "other programs"),
 )
+# Those that only some captures need, and how to get them.
+_OPTIONAL = (
+    ("laspy", "LAS and LAZ clouds", "pip install 'laspy[lazrs]'"),
+    ("pye57", "E57 clouds", "pip install pye57"),
+    ("pycolmap", "kerfwright poses", "pip install 'pycolmap>=3.11,<5'"),
+)
 MEMORY_GIB = 3  # a capture of 40 photographs and 300,000 points takes up to 2.5
 DISK_GIB = 1
 
@@ -45,6 +51,8 @@ def _examinations() -> Iterator[tuple[bool, str]]:
     yield (3, 11) <= sys.version_info < (3, 13), f"Python {version} (3.11 or 3.12 is needed)"
     for module, name, purpose in _MODULES:
         yield _import(module, name, purpose)
+    for module, purpose, remedy in _OPTIONAL:
+        yield _optional(module, purpose, remedy)
     yield _capture()
     yield _memory()
     free = shutil.disk_usage(os.getcwd()).free / 2**30
@@ -62,7 +70,17 @@ def _import(module: str, name: str, purpose: str) -> tuple[bool, str]:
         return False, f"{name}, for {purpose}: {reason}: run `pip install kerfwright` again; see README, Start"
     root = sys.modules[module.split(".")[0]]
     version = getattr(root, "__version__", "") or getattr(found, "__version__", "")
+    version = version if isinstance(version, str) else ""  # of pye57 it is a module
     return True, f"{name} {version}".rstrip() + f", for {purpose}"
+
+
+def _optional(module: str, purpose: str, remedy: str) -> tuple[bool, str]:
+    """Not there is sound; there and broken is not."""
+    from importlib.util import find_spec
+
+    if find_spec(module) is None:
+        return True, f"{module} is not installed; only {purpose} would need it: {remedy}"
+    return _import(module, module, purpose)
 
 
 def _capture() -> tuple[bool, str]:

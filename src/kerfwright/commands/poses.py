@@ -21,7 +21,7 @@ def poses(
     seed: Annotated[int, typer.Option("--seed", min=0, help="Of the random generator.")] = 0,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing but errors.")] = False,
 ) -> None:
-    """Recover the cameras of PHOTOS with COLMAP (pip install 'kerfwright[poses]'): all of a capture but its cloud."""
+    """Recover the cameras of PHOTOS with COLMAP (pip install pycolmap): all of a capture but its cloud."""
     from kerfwright.capture.recover import recover_cameras
 
     def say(text: str) -> None:

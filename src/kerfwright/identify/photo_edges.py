@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d, minimum_filter1d
 
 from kerfwright.capture.types import Capture, View
 
@@ -71,26 +71,28 @@ def sweep_edge(
     """Sweep an edge through space and find where the photographs show it.
 
     places (N, 3) world mm, neighbours in order along the edge; direction (3,) or (N, 3) unit; offsets (T,) mm, evenly
-    spaced; visible (V, N) bool: which view shows which place. smoothing: mm of the step detector. chunk: places
-    averaged before the step is measured. None when no view shows a whole chunk.
+    spaced; visible (V, N) bool: which view shows which place, or (V, N, T): at which offset. smoothing: mm of the step
+    detector. chunk: places averaged before the step is measured. None when no view shows a whole chunk.
     """
     direction = np.broadcast_to(direction, places.shape)
     grid = places[:, None, :] + offsets[None, :, None] * direction[:, None, :]
     step = offsets[1] - offsets[0]
     curves = []
     for k in range(len(photos.views)):
-        own = np.flatnonzero(visible[k])
+        at_all = visible[k] if visible.ndim == 2 else visible[k].any(axis=1)
+        own = np.flatnonzero(at_all)
         if len(own) >= chunk:
-            curves.extend(_view_curves(photos, k, grid[own], own, chunk, smoothing / step))
-    if not curves:
+            shown = None if visible.ndim == 2 else visible[k, own]
+            curves.extend(_view_curves(photos, k, grid[own], own, shown, chunk, smoothing / step))
+    if not any(np.isfinite(curve).any() for _, curve in curves):
         return None
     return _combine(np.array([c for _, c in curves]), [k for k, _ in curves], offsets)
 
 
 def _view_curves(
-    photos: Photos, k: int, grid: np.ndarray, own: np.ndarray, chunk: int, sigma: float
+    photos: Photos, k: int, grid: np.ndarray, own: np.ndarray, shown: np.ndarray | None, chunk: int, sigma: float
 ) -> list[tuple[int, np.ndarray]]:
-    """Edge strength over the offsets, one curve a chunk of places, in units of the curve's own median."""
+    """Edge strength over the offsets, one curve a chunk of places; NaN where something hides a part of the chunk."""
     view = photos.views[k]
     pixels, _ = view.project(grid.reshape(-1, 3))
     colours = photos.colours(k, np.nan_to_num(pixels, nan=-1.0).reshape(*grid.shape[:2], 2))
@@ -101,19 +103,23 @@ def _view_curves(
             continue
         profile = colours[group].mean(axis=0)
         slope = np.linalg.norm(gaussian_filter1d(profile, sigma, axis=0, order=1), axis=1)
+        if shown is not None:
+            slope[minimum_filter1d(shown[group].all(axis=0), 2 * int(2 * sigma) + 1) == 0] = np.nan
         curves.append((k, slope))
     return curves
 
 
 def _combine(slopes: np.ndarray, owners: list[int], offsets: np.ndarray) -> SweepResult:
     """Mean of the curves, each limited so that one strong background edge cannot outvote the rest."""
-    limited = _limited(slopes / max(np.median(slopes), 1e-6))
-    strength = limited.mean(axis=0)
+    limited = _limited(slopes / max(np.nanmedian(slopes), 1e-6))
+    told = np.isfinite(limited).sum(axis=0)
+    strength = np.nansum(limited, axis=0) / np.maximum(told, 1)
+    strength[told == 0] = np.median(strength[told > 0])
     inner = slice(2, len(offsets) - 2)
     k = 2 + int(np.argmax(strength[inner]))
     best = float(offsets[k] + refine_peak(strength[k - 1 : k + 2]) * (offsets[1] - offsets[0]))
     error = _standard_error(limited, owners, k, offsets)
-    shown = (maximum_filter1d(limited, 3, axis=1) > 2.0).mean(axis=0)
+    shown = (maximum_filter1d(np.nan_to_num(limited), 3, axis=1) > 2.0).sum(axis=0) / np.maximum(told, 1)
     return SweepResult(
         offsets, strength, best, error, float(strength[k] / np.median(strength)), len(set(owners)), shown
     )
@@ -137,7 +143,11 @@ def _standard_error(curves: np.ndarray, owners: list[int], k: int, offsets: np.n
     near = np.abs(offsets - offsets[k]) <= reach
     peaks = []
     for owner in sorted(set(owners)):
-        mean = curves[[o == owner for o in owners]].mean(axis=0)
-        peaks.append(offsets[near][np.argmax(mean[near])])
+        own = curves[[o == owner for o in owners]][:, near]
+        told = np.isfinite(own).any(axis=0)
+        if told.any():
+            peaks.append(offsets[near][told][np.argmax(np.nanmean(own[:, told], axis=0))])
+    if not peaks:
+        return reach / 2
     spread = 1.4826 * np.median(np.abs(np.array(peaks) - np.median(peaks)))
     return float(max(spread, 0.3 * (offsets[1] - offsets[0])) / np.sqrt(len(peaks))) if len(peaks) > 1 else reach / 2

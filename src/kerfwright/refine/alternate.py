@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from kerfwright.assemble import AssembleOptions, assemble
+from kerfwright.assemble.outlines import constrained_region
 from kerfwright.assemble.splits import SeamLine, find_seam_lines, seam_contact, seam_segments, split_sheet
 from kerfwright.assemble.types import Assembly
 from kerfwright.assemble.visibility import Obstacles
 from kerfwright.capture.types import Capture
+from kerfwright.identify.freespace import see_through
 from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.types import Parts, Sheet
-from kerfwright.refine.constrain import constrained_region, outline_region
+from kerfwright.refine.constrain import outline_region
 from kerfwright.refine.options import RefineOptions
 from kerfwright.refine.segment import SegmentOptions, segment_boards
 from kerfwright.refine.types import Outline
@@ -19,7 +21,7 @@ from kerfwright.refine.types import Outline
 __all__ = ["refined_assembly"]
 
 # outlines from photographs are this much better than the cloud's
-EXACT = AssembleOptions(outline_error=1 / 200, reach=1 / 60)
+EXACT = AssembleOptions(rough=False, outline_error=1 / 200, reach=1 / 60)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +38,9 @@ def refined_assembly(
 ) -> tuple[tuple[Outline, ...], Assembly]:
     """One outline a board and the assembly found with them."""
     diameter = capture.cloud.diameter
-    found = segment_boards(
-        assembly.sheets, assembly.constraints, capture, SegmentOptions(use_images=options.use_images)
-    )
+    free = see_through(capture, parts.spacing, max(5 * parts.noise, diameter / 150))
+    segmenting = SegmentOptions(use_images=options.use_images)
+    found = segment_boards(assembly.sheets, assembly.constraints, capture, segmenting, free)
     pieces = []
     for sheet, segments, board in zip(assembly.sheets, assembly.constraints, found, strict=True):
         for outline in board.outlines:

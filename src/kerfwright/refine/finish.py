@@ -8,13 +8,14 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
+from kerfwright.assemble.outlines import constrained_region
 from kerfwright.assemble.types import Assembly, ConstraintSegment
 from kerfwright.capture.types import Capture
 from kerfwright.errors import StageError
 from kerfwright.model import Board, CutPath, Finding, Line, Loop
 from kerfwright.model.geometry import edge_length
 from kerfwright.refine.boards import to_board
-from kerfwright.refine.constrain import constrained_region, to_loops
+from kerfwright.refine.constrain import to_loops
 from kerfwright.refine.curves import fit_curves
 from kerfwright.refine.options import Refined, RefineOptions
 from kerfwright.refine.types import Outline

@@ -95,8 +95,9 @@ def _findings(figures: dict, capture: Capture) -> Iterator[Finding]:
             figures["plain_share"],
         )
     if figures["fitting_share"] is not None and figures["fitting_share"] < FIT_SHARE:
+        amiss = f"{100 - 100 * figures['fitting_share']:.0f} % of the photographs"
         yield _warn(
-            "K025", f"{100 * (1 - figures['fitting_share']):.0f} % of the photographs show the cloud's colours elsewhere",
+            "K025", f"{amiss} show the cloud's colours elsewhere than the cameras put them",
             "cameras, photographs and cloud do not belong together, or their axes differ: export all from one project",
             figures["fitting_share"],
         )

@@ -16,15 +16,19 @@ from shapely.geometry import LineString, Polygon
 from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.capture.types import Capture
 from kerfwright.errors import OptionError
+from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.types import Sheet
 from kerfwright.refine.segment.boundary import Chain, chain_of, loops_of, registration, settle, snap
 from kerfwright.refine.segment.constraints import Limit, carve, fill_to_contacts, limits_of, margins
 from kerfwright.refine.segment.edges import EdgeScan, scan_edges
 from kerfwright.refine.segment.evidence import (
+    Bounds,
     ViewEvidence,
     average,
+    backed_pixels,
     classes_on_grid,
     cut_face_band,
+    free_pixels,
     gather,
     grown,
     means_of_others,
@@ -43,6 +47,7 @@ __all__ = ["segment_boards"]
 
 CORNER_REACH = 2.0  # thicknesses over which an open corner between constraint segments is closed
 DISAGREES = 1.2  # mm that a registered view may still differ by from the others before it is left out
+LEAST_KNOWN = 0.5  # of a further piece's area that the rough outline had too
 LARGEST_SHIFT = 3.0  # mm; poses good to half a pixel need far less
 
 
@@ -61,6 +66,9 @@ class _Board:
     masks: list[np.ndarray]  # one a piece
     regions: list[Polygon]  # the same as polygons
     beyond: np.ndarray  # just past the segments it is known to touch: there the outline's error has no say
+    backed: np.ndarray  # pixels whose nearest place on the rough outline has a cut face or a contact
+    rough: np.ndarray  # the mask before the first round
+    free: np.ndarray  # pixels where cameras saw through the board's middle
     left_out: tuple[str, ...] = ()
 
     @property
@@ -70,7 +78,7 @@ class _Board:
 
 def segment_boards(
     sheets: Sequence[Sheet], constraints: Sequence[Sequence[ConstraintSegment]], capture: Capture,
-    options: SegmentOptions | None = None,
+    options: SegmentOptions | None = None, free: FreeSpace | None = None,
 ) -> list[BoardOutlines]:
     """Outlines of all boards (paper, Joint Image-Based Segmentation).
 
@@ -79,6 +87,7 @@ def segment_boards(
     sheets : rough boards, world frame of `capture`, millimetres.
     constraints : `constraints[i]` belongs to `sheets[i]`.
     capture : prepared: +z up, floor at z = 0.
+    free : what the cameras saw through; there is no wood.
 
     Returns
     -------
@@ -96,7 +105,7 @@ def segment_boards(
     occluders = Occluders(sheets, [[s.region] for s in sheets])
     with ThreadPoolExecutor(max(1, options.threads)) as pool:
         boards = list(pool.map(
-            lambda i: _begin(i, sheets[i], constraints[i], capture, occluders, options), range(len(sheets))
+            lambda i: _begin(i, sheets[i], constraints[i], capture, occluders, free, options), range(len(sheets))
         ))
         for round_idx in range(options.rounds):
             last = boards
@@ -109,7 +118,7 @@ def segment_boards(
 
 def _begin(
     idx: int, sheet: Sheet, constraints: Sequence[ConstraintSegment], capture: Capture, occluders: Occluders,
-    options: SegmentOptions,
+    free: FreeSpace | None, options: SegmentOptions,
 ) -> _Board:
     """A board before its first round: views, raster, constraints."""
     views = choose_views(sheet, idx, capture.views, occluders, options) if options.use_images else []
@@ -117,12 +126,16 @@ def _begin(
     pixel = options.pixel or float(np.clip(1 / np.median(densities), options.min_pixel, options.max_pixel))
     limits = limits_of(constraints, sheet.thickness.value, CORNER_REACH * sheet.thickness.value)
     covered = _ground_covered(sheet.region, limits, options.contact_reach)
-    grid = grid_over(covered, options.search_margin + 4 * pixel, pixel, options.max_grid)
+    grid = grid_over(covered, options.unbacked_margin + 4 * pixel, pixel, options.max_grid)
     excluded, crossing = carve(limits, grid)
     mask = fill_to_contacts(grid.mask(sheet.region) & ~excluded, limits, grid, options.contact_reach)
     shifts = [np.zeros(2) for _ in views]
-    return _Board(idx, sheet, limits, grid, views, shifts, excluded, crossing, [mask], [sheet.region],
-                  grid.mask(margins(limits, 2 * options.outline_error)))
+    beyond = grid.mask(margins(limits, 2 * options.outline_error))
+    cut_points = sheet.to_board(capture.cloud.points[sheet.cut_idx])[:, :2]
+    backed = backed_pixels(mask, beyond, cut_points, grid, options.outline_error)
+    seen_through = free_pixels(sheet, grid, free) if free else np.zeros(grid.shape, bool)
+    return _Board(idx, sheet, limits, grid, views, shifts, excluded, crossing, [mask], [sheet.region], beyond, backed,
+                  mask, seen_through & ~mask)
 
 
 def _ground_covered(region: Polygon, limits: Sequence[Limit], reach: float) -> Polygon:
@@ -138,11 +151,9 @@ def _round(
     """One round of a board: evidence, cut, pieces, and how far its views must be moved."""
     if not board.views:
         return board
-    first = round_idx == 0
-    error = options.outline_error if first else options.refined_error
-    margin = options.search_margin if first else options.outline_error
-    forbidden = board.excluded | _taken(board, boards, error)
-    seeds = seeds_of(board.mask, board.beyond, forbidden, error, margin, board.grid.pixel)
+    error, bounds = _bounds(board, options, first=round_idx == 0)
+    forbidden = board.excluded | board.free | _taken(board, boards, error)
+    seeds = seeds_of(board.mask, board.beyond, forbidden, bounds, board.grid.pixel)
     if not seeds.inside.any():
         return replace(board, views=[], shifts=[])
     evidences, contrasts = _evidence(board, seeds, error, occluders, photos, options)
@@ -150,11 +161,25 @@ def _round(
         return replace(board, views=[], shifts=[])
     weights = smoothness_weights(contrasts, board.crossing, options.smoothness)
     mask = cut(average(evidences, seeds), weights, seeds.inside, seeds.outside)
-    masks = clean(mask, board.grid.pixel, options)
+    masks = _own(clean(mask, board.grid.pixel, options), board.rough)
     if not masks:
         return replace(board, views=[], shifts=[])
     board = replace(board, masks=masks, regions=[pieces(m, board.grid) for m in masks])
     return _registered(board, occluders, photos, options)
+
+
+def _own(masks: list[np.ndarray], rough: np.ndarray) -> list[np.ndarray]:
+    """The largest piece, and those others that the cloud knew of: dark places beside a board look like anything."""
+    return masks[:1] + [m for m in masks[1:] if (m & rough).sum() > LEAST_KNOWN * m.sum()]
+
+
+def _bounds(board: _Board, options: SegmentOptions, first: bool) -> tuple[float, Bounds]:
+    """How wrong the outline so far may be: mm where it is backed, and pixel by pixel."""
+    if not first:
+        return options.refined_error, Bounds(options.refined_error, options.outline_error)
+    errors = np.where(board.backed, options.outline_error, options.unbacked_error).astype(np.float32)
+    margins_ = np.where(board.backed, options.search_margin, options.unbacked_margin).astype(np.float32)
+    return options.outline_error, Bounds(errors, margins_)
 
 
 def _taken(board: _Board, boards: Sequence[_Board], error: float) -> np.ndarray:
@@ -188,7 +213,7 @@ def _evidence(
     evidences, total, count = [], 0, 1e-6
     for view, lab, mean, shown, kind, core in zip(board.views, labs, means, seen, kinds, cores, strict=True):
         band = grown(cut_face_band(board.mask, view, board.grid), error / 2, board.grid.pixel) & ~seeds.inside
-        said = gather(lab, mean, shown, kind, band, seeds, error, options, rng)
+        said = gather(lab, mean, shown, kind, band, seeds, options, rng)
         if said is not None:
             evidences.append(said)
             total = total + contrast(lab, core) * said.seen

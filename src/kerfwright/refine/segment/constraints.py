@@ -16,7 +16,7 @@ __all__ = ["Limit", "carve", "fill_to_contacts", "limits_of", "margins", "neighb
 
 SLANT = 0.02  # sine of the tilt under which a cut face counts as square
 PARALLEL = 0.995
-TOUCHING = ("contact", "corner", "ground")  # origins of segments that the board reaches
+TOUCHING = ("contact", "corner", "ground", "photo")  # origins of segments that the board reaches
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.types import Sheet
 from kerfwright.refine.segment.appearance import Mixture, fit_mixture, same_surface, with_shade
 from kerfwright.refine.segment.grid import Grid
@@ -15,7 +16,8 @@ from kerfwright.refine.segment.scene import BOARD, CLEAR, Occluders
 from kerfwright.refine.segment.views import BoardView
 
 __all__ = [
-    "Seeds", "ViewEvidence", "average", "classes_on_grid", "cut_face_band", "gather", "grown", "means_of_others",
+    "Bounds", "Seeds", "ViewEvidence", "average", "backed_pixels", "classes_on_grid", "cut_face_band", "free_pixels",
+    "gather", "grown", "means_of_others",
     "seeds_of", "signed_distance",
 ]
 
@@ -24,8 +26,22 @@ OCCLUDER_ERROR = 0.5  # share of the outline error by which occluders are grown
 PRIOR = 0.5  # nats for each outline error that a pixel lies inside the outline so far
 PRIOR_REACH = 3.0  # outline errors
 LEAST_TRUST = 0.15
+NEAR_OUTLINE = 40.0  # mm
+BACKING = 4  # cut-face points by a place on the outline that back it
 PARALLAX_CAP = 1.5  # nats from colours that agree, or not, between views
 LEAST_PARALLAX = 500  # pixels to learn that from
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """How far, mm, the outline so far may be off inwards (`error`) and outwards (`margin`): numbers or (rows, cols)."""
+
+    error: np.ndarray | float
+    margin: np.ndarray | float
+
+    @property
+    def least_error(self) -> float:
+        return float(np.min(self.error))
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +50,7 @@ class Seeds:
 
     inside: np.ndarray  # bool (rows, cols)
     outside: np.ndarray
+    beyond: np.ndarray  # so far out that its colours are those of what lies outside
     distance: np.ndarray  # mm, positive inside the outline so far
     belief: np.ndarray  # how far inside, in errors of the outline
 
@@ -60,8 +77,40 @@ def grown(mask: np.ndarray, by: float, pixel: float) -> np.ndarray:
     return signed_distance(mask, pixel) > -by if mask.any() else mask
 
 
+def backed_pixels(
+    mask: np.ndarray, beyond: np.ndarray, cut_points: np.ndarray, grid: Grid, error: float
+) -> np.ndarray:
+    """Pixels whose nearest place on the mask's outline is backed: cut-face points lie by it, or a contact (`beyond`).
+
+    cut_points (N, 2) mm in the board's plane.
+    """
+    from scipy.ndimage import distance_transform_edt
+    from scipy.spatial import cKDTree
+
+    if not mask.any():
+        return np.ones(mask.shape, bool)
+    backed = grown(beyond, error / 2, grid.pixel)
+    if len(cut_points):
+        edge = np.argwhere(abs(signed_distance(mask, grid.pixel)) < 1.5 * grid.pixel)
+        near = cKDTree(cut_points).query_ball_point(grid.to_xy(edge[:, ::-1]), error, return_length=True)
+        backed[tuple(edge[near >= BACKING].T)] = True
+    nearest = np.where(mask, *(distance_transform_edt(m, return_indices=True)[1] for m in (mask, ~mask)))
+    return backed[tuple(nearest)]
+
+
+def free_pixels(sheet: Sheet, grid: Grid, free: FreeSpace) -> np.ndarray:
+    """Pixels whose place half way through the board two cameras saw through."""
+    import cv2
+
+    coarse = grid.centres()[::STRIDE, ::STRIDE]
+    middle = np.full((*coarse.shape[:2], 1), sheet.thickness.value / 2)
+    places = sheet.to_world(np.concatenate([coarse, middle], axis=2).reshape(-1, 3))
+    seen = (free.votes(places) >= 2).reshape(coarse.shape[:2]).astype(np.uint8)
+    return cv2.resize(seen, grid.shape[::-1], interpolation=cv2.INTER_NEAREST).astype(bool)
+
+
 def seeds_of(
-    mask: np.ndarray, beyond: np.ndarray, forbidden: np.ndarray, error: float, margin: float, pixel: float
+    mask: np.ndarray, beyond: np.ndarray, forbidden: np.ndarray, bounds: Bounds, pixel: float
 ) -> Seeds:
     """Hard seeds: the eroded outline is inside; what is far out, or taken by constraints or other boards, is outside.
 
@@ -69,11 +118,13 @@ def seeds_of(
     """
     distance = signed_distance(mask, pixel)
     settled = signed_distance(mask | beyond, pixel)
-    depth = min(error, 0.5 * float(distance.max()))
-    outside = (distance < -margin) & ~_hull(mask)
+    depth = np.minimum(bounds.error, 0.5 * float(distance.max()))
+    hull = _hull(mask)
+    outside = (distance < -bounds.margin) & ~hull
     outside[[0, -1]], outside[:, [0, -1]] = True, True
-    return Seeds((settled > depth) & mask & ~forbidden, outside | forbidden, distance,
-                 _belief(distance, mask, error, margin, pixel))
+    sure = outside | (distance < -bounds.error) & (bounds.margin < 4 * bounds.least_error)
+    return Seeds((settled > depth) & mask & ~forbidden, outside | forbidden, sure, distance,
+                 _belief(distance, mask, bounds, pixel))
 
 
 def _hull(mask: np.ndarray) -> np.ndarray:
@@ -118,14 +169,14 @@ def cut_face_band(mask: np.ndarray, board_view: BoardView, grid: Grid) -> np.nda
 
 def gather(
     lab: np.ndarray, others: np.ndarray, seen: np.ndarray, kinds: np.ndarray, band: np.ndarray, seeds: Seeds,
-    error: float, options: SegmentOptions, rng: np.random.Generator,
+    options: SegmentOptions, rng: np.random.Generator,
 ) -> ViewEvidence | None:
     """One view's evidence; None when it shows too little of the inside to learn its colours.
 
     `others` (rows, cols, 3) is the mean of the other views of the same side, NaN where there is none.
     """
-    beyond = seen & (seeds.distance < -error) & ~band
-    inside = _learn(lab[seen & seeds.inside], options, rng)
+    beyond = seen & seeds.beyond & ~band
+    inside = _learn(_balanced(lab, seen & seeds.inside, seeds.distance), options, rng)
     outside = {kind: _learn(lab[beyond & (kinds == kind)], options, rng) for kind in (CLEAR, BOARD)}
     if inside is None:
         return None
@@ -156,6 +207,16 @@ def _parallax_ratio(apart: np.ndarray, inside: np.ndarray, outside: np.ndarray) 
     ratio = np.clip(np.log(shares[0] / shares[1]), -PARALLAX_CAP, PARALLAX_CAP)
     known = np.isfinite(apart)
     return np.where(known, ratio[np.digitize(np.where(known, apart, 0), bins) - 1], 0).astype(np.float32)
+
+
+def _balanced(lab: np.ndarray, mask: np.ndarray, distance: np.ndarray) -> np.ndarray:
+    """Colours inside, those near the outline as many as all others: light changes over a board, and there it counts."""
+    near = lab[mask & (distance < NEAR_OUTLINE)]
+    rest = lab[mask & (distance >= NEAR_OUTLINE)]
+    if not len(near) or not len(rest):
+        return lab[mask]
+    few = max(1, len(rest) // len(near)), max(1, len(near) // len(rest))
+    return np.concatenate([near[:: few[1]], rest[:: few[0]]])
 
 
 def _learn(colours: np.ndarray, options: SegmentOptions, rng: np.random.Generator) -> Mixture | None:
@@ -203,10 +264,11 @@ def average(evidences: Sequence[ViewEvidence], seeds: Seeds) -> np.ndarray:
     return np.where(weight > 0, total / np.maximum(weight, 1e-6), 0) + PRIOR * seeds.belief
 
 
-def _belief(distance: np.ndarray, mask: np.ndarray, error: float, margin: float, pixel: float) -> np.ndarray:
+def _belief(distance: np.ndarray, mask: np.ndarray, bounds: Bounds, pixel: float) -> np.ndarray:
     """Outline errors inside the outline so far, capped; 0 in bays and holes that may just be missing from the cloud."""
     from scipy.ndimage import binary_fill_holes
 
-    closed = binary_fill_holes(grown(grown(mask, margin, pixel), -margin, pixel))
-    believed = np.clip(distance / error, -PRIOR_REACH, PRIOR_REACH)
+    reach = float(np.min(bounds.margin))
+    closed = binary_fill_holes(grown(grown(mask, reach, pixel), -reach, pixel))
+    believed = np.clip(distance / bounds.error, -PRIOR_REACH, PRIOR_REACH)
     return np.where(closed & ~mask, 0, believed).astype(np.float32)

@@ -20,10 +20,12 @@ class SegmentOptions:
     min_pixel: float = 0.8  # finer is for the exact boundary, which is read from the photographs themselves
     max_pixel: float = 1.0
     max_grid: int = 700_000  # pixels of a rectified image; larger boards get coarser pixels
-    min_visible: float = 0.3  # share of a board's rough region that a view must show to be of use
+    min_visible: float = 0.12  # share of a board's rough region that a view must show to be of use
     min_slant: float = 0.2  # cosine between line of sight and sheet normal below which a view is too grazing
     outline_error: float = 8.0  # a rough outline is taken to be true to this: what is further in or out is known
     search_margin: float = 24.0  # how far beyond the rough outline the board may reach
+    unbacked_error: float = 24.0  # the same two where no cut face and no contact backs the outline: stereo spans dark
+    unbacked_margin: float = 80.0  # openings with a veil, and loses dark wood
     contact_reach: float = 250.0  # a board known to touch another may be missing up to there: it is dark in corners
     refined_error: float = 4.0  # the same, of a mask after the first round
     components: int = 5  # of a colour mixture

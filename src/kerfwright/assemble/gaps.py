@@ -1,0 +1,73 @@
+"""Gaps of the cloud filled: holes and bays of a rough region that nobody saw through and no cut face lines.
+
+Stereo thins out in dark corners and leaves regions in rags. Real holes and notches show either what lies behind them or
+their own cut faces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+from shapely.geometry import Polygon
+
+from kerfwright.assemble.options import AssembleOptions
+from kerfwright.assemble.outlines import largest_piece
+from kerfwright.capture.types import Cloud
+from kerfwright.identify.freespace import FreeSpace
+from kerfwright.identify.types import Sheet
+
+__all__ = ["mended"]
+
+LINED = 0.15  # of a gap's outline; beyond, cut faces show that it is real
+SEEN = 0.3  # of a gap's area; beyond, it was seen through
+SAMPLES = 60
+
+
+def mended(sheets: tuple[Sheet, ...], cloud: Cloud, free: FreeSpace, options: AssembleOptions) -> tuple[Sheet, ...]:
+    """The sheets with the gaps in their regions filled that are only gaps of the cloud."""
+    reach, near = options.veil * cloud.diameter, options.end_offset * 2 * cloud.diameter
+    return tuple(_mended(sheet, cloud, free, reach, near) for sheet in sheets)
+
+
+def _mended(sheet: Sheet, cloud: Cloud, free: FreeSpace, reach: float, near: float) -> Sheet:
+    """reach: mm, half the width of a gap that is looked at; near: mm about an outline where cut faces line it."""
+    closed = sheet.region.buffer(reach, join_style="mitre").buffer(-reach, join_style="mitre").union(sheet.region)
+    holes = [Polygon(ring) for ring in sheet.region.interiors]
+    gaps = shapely.union_all([closed, *holes]).difference(sheet.region)
+    cut = sheet.to_board(cloud.points[sheet.cut_idx])[:, :2]
+    tree = cKDTree(cut) if len(cut) else None
+    fill = [
+        gap for gap in getattr(gaps, "geoms", [gaps])
+        if gap.area > 1.0 and not _is_lined(gap, sheet.region, tree, near) and not _is_seen(gap, sheet, free)
+    ]
+    if not fill:
+        return sheet
+    whole = shapely.union_all([sheet.region, *(gap.buffer(0.05) for gap in fill)])
+    return replace(sheet, region=largest_piece(whole))
+
+
+def _is_lined(gap: Polygon, region: Polygon, tree: cKDTree | None, near: float) -> bool:
+    """Whether cut-face points lie along the part of the region's outline that the gap shares."""
+    shared = region.boundary.intersection(gap.buffer(0.05))
+    if tree is None or shared.length == 0:
+        return False
+    at = np.arange(0.0, shared.length, near / 2)
+    places = shapely.get_coordinates([shared.interpolate(s) for s in at])
+    distance, _ = tree.query(places)
+    return float((distance < near).mean()) > LINED
+
+
+def _is_seen(gap: Polygon, sheet: Sheet, free: FreeSpace) -> bool:
+    """Whether cameras saw through the gap."""
+    low_x, low_y, high_x, high_y = gap.bounds
+    step = max(np.sqrt(gap.area / SAMPLES), 0.5)
+    x, y = np.meshgrid(np.arange(low_x + step / 2, high_x, step), np.arange(low_y + step / 2, high_y, step))
+    inside = shapely.contains_xy(gap, x.ravel(), y.ravel())
+    xy = np.stack([x.ravel(), y.ravel()], axis=1)[inside]
+    if not len(xy):
+        return False
+    places = sheet.to_world(np.c_[xy, np.full(len(xy), sheet.thickness.value / 2)])
+    return float((free.votes(places) >= 2).mean()) > SEEN

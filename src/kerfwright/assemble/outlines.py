@@ -1,0 +1,84 @@
+"""Regions made to obey their constraint segments: run on to them where they stop short, cut off where they go beyond.
+
+Boundaries near a contact are dark or hidden and traced badly; what is known there is the plane of the other board.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from shapely.geometry import Polygon
+
+from kerfwright.assemble.types import ConstraintSegment
+
+__all__ = ["constrained_region", "filled_region", "largest_piece", "segment_axes"]
+
+SHALLOW = 0.12  # of the reach: how much deeper than usual a column may be and still be filled
+
+
+def constrained_region(
+    region: Polygon, segments: tuple[ConstraintSegment, ...], reach: float, beyond: float
+) -> Polygon:
+    """The region run on to each segment over its length (by at most `reach`) and cut off behind it (as far as
+    `beyond`).
+    """
+    region = filled_region(region, segments, reach)
+    for segment in segments:
+        widen = 0.0 if segment.origin == "ground" else beyond / 4
+        region = largest_piece(region.difference(_strip(segment, -beyond, 0.0, widen)))
+    return region
+
+
+def filled_region(region: Polygon, segments: tuple[ConstraintSegment, ...], reach: float) -> Polygon:
+    """The region run on to each segment over its length, by at most `reach` mm."""
+    for segment in segments:
+        filled = shapely.union_all([region, *_filling(region, segment, reach)])
+        region = largest_piece(filled.buffer(0.01).buffer(-0.01))
+    return region
+
+
+def segment_axes(segment: ConstraintSegment) -> tuple[np.ndarray, np.ndarray, float]:
+    """Unit direction, inward normal, length."""
+    along = segment.end - segment.start
+    length = float(np.linalg.norm(along))
+    along = along / length
+    return along, np.array([-along[1], along[0]]), length
+
+
+def _strip(segment: ConstraintSegment, low: float, high: float, widen: float) -> Polygon:
+    """Rectangle between two distances inside the segment."""
+    along, inward, _ = segment_axes(segment)
+    a, b = segment.start - widen * along, segment.end + widen * along
+    return Polygon([a + low * inward, b + low * inward, b + high * inward, a + high * inward])
+
+
+def _filling(region: Polygon, segment: ConstraintSegment, reach: float) -> list[Polygon]:
+    """What lies between the segment and the region's nearest boundary, one polygon a run of columns.
+
+    Columns that are far deeper than most are left alone: there the region ends beside the segment, not before it.
+    """
+    along, inward, length = segment_axes(segment)
+    at = np.linspace(0, length, max(8, int(length / 2)))
+    feet = segment.start + at[:, None] * along
+    rays = shapely.linestrings(np.stack([feet - 0.5 * inward, feet + reach * inward], axis=1))
+    depth = np.full(len(at), np.inf)
+    for k, hit in enumerate(shapely.intersection(rays, region)):
+        xy = shapely.get_coordinates(hit)
+        if len(xy):
+            depth[k] = max(float(((xy - feet[k]) @ inward).min()), 0.0)
+    if not np.isfinite(depth).any():
+        return []
+    usual = float(np.median(depth[np.isfinite(depth)]))
+    fillable = depth <= 2 * usual + SHALLOW * reach
+    runs = np.split(np.arange(len(at)), np.flatnonzero(np.diff(fillable.astype(int))) + 1)
+    return [_curtain(feet[run], depth[run] + 0.5, inward) for run in runs if fillable[run[0]] and len(run) > 2]
+
+
+def _curtain(feet: np.ndarray, depth: np.ndarray, inward: np.ndarray) -> Polygon:
+    return Polygon(np.concatenate([feet, (feet + depth[:, None] * inward)[::-1]])).buffer(0)
+
+
+def largest_piece(shape) -> Polygon:
+    """The largest polygon of a shape, empty when there is none."""
+    pieces = [p for p in getattr(shape, "geoms", [shape]) if p.geom_type == "Polygon"]
+    return max(pieces, key=lambda p: p.area) if pieces else Polygon()
