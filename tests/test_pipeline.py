@@ -84,4 +84,7 @@ def test_the_model_says_where_it_lies_and_what_it_came_from():
     origin = model.provenance
     assert (origin.version, origin.capture, origin.seed) == (__version__, "stool", 3)
     assert (origin.points, origin.images) == (5, 0)
-    assert origin.options == {"up": "z", "millimetres_per_unit": None, "seed": 3}
+    assert origin.options == {
+        "up": "z", "millimetres_per_unit": None, "seed": 3, "crop": "auto", "ground": None, "length": "", "markers": "",
+        "scale_by_stock": False,
+    }  # fmt: skip
