@@ -29,5 +29,5 @@ def poses(
             typer.echo(text, err=True)
 
     found = recover_cameras(photographs, out, one_camera=not several, seed=seed, say=say)
-    say(f"{found.placed} of {found.photographs} photographs placed; {found.points} points, {found.error:.2f} pixels off")
+    say(f"{found.placed} of {found.photographs} photographs placed, {found.points} points, {found.error:.2f} px off")
     say(f"The capture still needs its cloud, {out / 'cloud.ply'}: see docs/tutorial.md, The cloud.")
