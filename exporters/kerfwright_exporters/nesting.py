@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["NestOptions", "Place", "nest"]
 
 MOST_MOVES = 40_000  # of all boards together
+MANY_PARTS = 8  # convex parts a board, from which a move takes so long that fewer are made
 LONG_STEP, SHORT_STEP, SHORTEST_STEP = (
     0.01,
     0.002,
@@ -33,7 +34,7 @@ LONG_STEP, SHORT_STEP, SHORTEST_STEP = (
 )  # of the length in use, by which the last sheet is cut shorter
 EXPLORING = 0.7  # share of the moves spent on long steps
 DENSEST = 0.97  # share of a sheet that boards with curves and corners hardly fill
-MANY_CORNERS, STRAY = 24, 0.05  # outlines of more corners are drawn with fewer, up to twice so far outside, mm
+MANY_CORNERS, STRAY = 24, 0.25  # outlines of more corners are drawn with fewer, up to twice so far outside, mm
 
 
 def nest(outlines: list[Polygon], options: NestOptions) -> list[Place]:
@@ -129,7 +130,8 @@ class _Search:
         self.turns = len(options.turns)
         self.full = np.array([options.length, options.width]) + options.spacing
         self.rng = np.random.default_rng(options.seed)
-        self.moves = min(MOST_MOVES, options.moves * len(outlines))
+        parts = len(self.shapes.arrays[5]) / len(self.shapes.sizes)
+        self.moves = int(min(MOST_MOVES, options.moves * len(outlines)) * min(1.0, MANY_PARTS / parts))
 
     def best_places(self) -> list[Place]:
         """The best layout found; the first one, where drawing outlines with fewer corners makes one too large."""
