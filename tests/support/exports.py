@@ -158,7 +158,7 @@ def metashape(folder: Path, made: Scene, kind: str = "frame") -> list[np.ndarray
         '<?xml version="1.0" encoding="UTF-8"?><document version="2.0.0"><chunk label="Chunk 1" enabled="true">'
         f'<sensors next_id="4">{"".join(sensors)}</sensors><cameras next_id="5">{"".join(cameras)}'
         '<camera id="4" sensor_id="0" label="not aligned.png"/></cameras>'
-        f"<transform>{transform}</transform></chunk></document>",
+        f"{transform}</chunk></document>",
         encoding="utf-8",
     )
     return pixels
