@@ -57,7 +57,8 @@ def _run_on(
     """
     from kerfwright.assemble.outlines import filled_region
 
+    known = [tuple(s for s in segments if s.origin in ("contact", "ground")) for segments in constraints]
     return tuple(
         replace(sheet, region=filled_region(sheet.region, segments, reach))
-        for sheet, segments in zip(sheets, constraints, strict=True)
+        for sheet, segments in zip(sheets, known, strict=True)
     )

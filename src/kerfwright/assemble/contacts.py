@@ -119,14 +119,18 @@ def _end_is_seen(scene: _Scene, joint: Joint) -> bool:
 
 
 def _unfinished(scene: _Scene, joint: Joint | None) -> Joint | None:
-    """A far joint whose board just fades out: no cut face ends it, and nobody saw through the gap."""
+    """A far joint whose board just fades out: no cut face ends it, nobody saw through the gap, and the photographs show
+    an edge at the plane, or nothing.
+    """
     options = scene.options
     if joint is None or joint.gap > scene.mm(options.unseen_reach) or joint.length < scene.mm(options.reach):
         return None
     if _end_is_seen(scene, joint) or _gap_is_free(scene, joint) or _gap_is_taken(scene, joint):
         return None
     end = _end(scene, joint)
-    return None if end is not None and _ends_before(end, options) else joint
+    if end is None or end.views < LEAST_VIEWS:
+        return joint
+    return None if end.excess < options.end_excess or _ends_before(end, options) else joint
 
 
 def _gap_is_free(scene: _Scene, joint: Joint) -> bool:

@@ -76,7 +76,7 @@ def look_for_end(
         )
         if sweep is not None:
             found.append(_end(sweep, window))
-    return max(found, key=lambda e: (e.excess, e.views)) if found else None
+    return max(found, key=lambda e: (min(e.views, 3), e.excess)) if found else None
 
 
 def _end(sweep: SweepResult, window: float) -> End:
