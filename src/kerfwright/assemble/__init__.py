@@ -21,6 +21,7 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     from kerfwright.assemble.backs import measured_backs
     from kerfwright.assemble.constraints import constraint_segments
     from kerfwright.assemble.contacts import find_contacts, to_contact
+    from kerfwright.assemble.flush import flush_neighbours
     from kerfwright.assemble.gaps import mended
     from kerfwright.assemble.stock import share_thickness
     from kerfwright.assemble.veils import still_open, unveiled
@@ -37,7 +38,7 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     sheets = measured_backs(sheets, photos, diameter, options)
     free = see_through(capture, parts.spacing, max(5 * parts.noise, diameter / 150))
     sheets = mended(sheets, capture.cloud, free, options)
-    sheets = share_thickness(sheets, diameter, options)
+    sheets = flush_neighbours(share_thickness(sheets, diameter, options), diameter, options)
     for _ in range(options.passes):
         decided = find_contacts(sheets, capture.cloud, photos, free, options)
         segments = constraint_segments(sheets, decided, diameter, options)

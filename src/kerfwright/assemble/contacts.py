@@ -186,7 +186,9 @@ def _confirmed(scene: _Scene, joint: Joint | None) -> Decided | None:
     if _end_is_seen(scene, joint) or _gap_is_free(scene, joint) or _gap_is_taken(scene, joint):
         return None
     end = _end(scene, joint)
-    if end is None or end.views < LEAST_VIEWS or end.excess < scene.options.end_excess or _ends_before(end, scene.options):
+    if end is None or end.views < LEAST_VIEWS:
+        return None
+    if end.excess < scene.options.end_excess or _ends_before(end, scene.options):
         return None
     return Decided(joint, 1, None, ContactEvidence(seam_score=end.score, views=end.views, decided_by="seam"))
 

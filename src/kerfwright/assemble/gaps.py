@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import shapely
 from scipy.spatial import cKDTree
-from shapely.geometry import Polygon
+from shapely.geometry import LineString, Polygon
 
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.assemble.outlines import largest_piece
@@ -35,28 +35,35 @@ def mended(sheets: tuple[Sheet, ...], cloud: Cloud, free: FreeSpace, options: As
 def _mended(sheet: Sheet, cloud: Cloud, free: FreeSpace, reach: float, near: float) -> Sheet:
     """reach: mm, half the width of a gap that is looked at; near: mm about an outline where cut faces line it."""
     closed = sheet.region.buffer(reach, join_style="mitre").buffer(-reach, join_style="mitre").union(sheet.region)
-    holes = [Polygon(ring) for ring in sheet.region.interiors]
-    gaps = shapely.union_all([closed, *holes]).difference(sheet.region)
+    whole = shapely.union_all([closed, *(Polygon(ring) for ring in sheet.region.interiors)])
+    outline, gaps = whole.boundary, whole.difference(sheet.region)
     cut = sheet.to_board(cloud.points[sheet.cut_idx])[:, :2]
     tree = cKDTree(cut) if len(cut) else None
     fill = [
         gap for gap in getattr(gaps, "geoms", [gaps])
-        if gap.area > 1.0 and not _is_lined(gap, sheet.region, tree, near) and not _is_seen(gap, sheet, free)
+        if gap.area > 1.0 and not _is_lined(gap, sheet.region, outline, tree, near) and not _is_seen(gap, sheet, free)
     ]
     if not fill:
         return sheet
-    whole = shapely.union_all([sheet.region, *(gap.buffer(0.05) for gap in fill)])
-    return replace(sheet, region=largest_piece(whole))
+    filled = shapely.union_all([sheet.region, *(gap.buffer(0.05) for gap in fill)])
+    return replace(sheet, region=largest_piece(filled))
 
 
-def _is_lined(gap: Polygon, region: Polygon, tree: cKDTree | None, near: float) -> bool:
-    """Whether cut-face points lie along the part of the region's outline that the gap shares."""
+def _is_lined(
+    gap: Polygon, region: Polygon, outline: LineString, tree: cKDTree | None, near: float
+) -> bool:
+    """Whether cut-face points lie along the part of the region's outline that the gap shares; those at the mouth of a
+    bay belong to the outline of the board.
+    """
     shared = region.boundary.intersection(gap.buffer(0.05))
     if tree is None or shared.length == 0:
         return False
-    at = np.arange(0.0, shared.length, near / 2)
-    places = shapely.get_coordinates([shared.interpolate(s) for s in at])
-    distance, _ = tree.query(places)
+    along = [shared.interpolate(s) for s in np.arange(0, shared.length, near / 2)]
+    places = shapely.points(shapely.get_coordinates(along))
+    inner = places[shapely.distance(places, outline) > near]
+    if not len(inner):
+        return False
+    distance, _ = tree.query(shapely.get_coordinates(inner))
     return float((distance < near).mean()) > LINED
 
 

@@ -18,6 +18,7 @@ class AssembleOptions:
     direction_sigmas: float = 3.0
     thickness_sigmas: float = 3.0
     thickness_floor: float = 1 / 1500  # least standard error of a thickness: eased edges hide part of it
+    flush: float = 1 / 1000  # sheet planes of neighbours that differ by less are one
     ground_reach: float = 1 / 40  # a board that comes this near the floor stands on it
     outline_error: float = 1 / 60  # how far a rough outline may be off
     ragged: float = 1 / 60  # ... in the dark, also after it was traced in photographs
