@@ -27,6 +27,9 @@ CLEAR_STRENGTH = 5.0  # of the best seam of a board: one clear seam lends its we
 LEAST_PERSISTENCE = 0.6  # share of all stretches in all views that show it
 LEAST_VIEWS = 4
 MOST_VIEWS = 6
+EASED = 1 / 40  # of D; eased edges of two boards lie no further apart
+GAP_SHARE = 0.5  # of the way between two such lines: the rest is rounding; it cannot be told apart from above
+PARTNER = 0.7  # strength of the weaker line of the two
 NARROWEST = 1 / 10  # of D; narrower strips are shadows and edges more often than boards
 
 
@@ -40,6 +43,7 @@ class SeamLine:
     end: np.ndarray
     strength: float
     views: int
+    gap: float = 0.0  # mm between the two boards, where their eased edges show as two lines
 
 
 def find_seam_lines(
@@ -86,14 +90,14 @@ def _seams_across(
     strength = sweep.strength / np.median(sweep.strength)
     known = _known_lines(sheet, m, touching)
     ends = [along.min(), along.max()]
+    step = offsets[1] - offsets[0]
+    found = _peaks(strength, sweep.persistence, reach=round(margin / step))
+    places = [(k, step * _partner(strength, k, EASED * diameter / step)) for k in found]
     return [
-        SeamLine(
-            m, float(offsets[k]), offsets[k] * m + ends[0] * tangent, offsets[k] * m + ends[1] * tangent,
-            float(strength[k]), sweep.views,
-        )
-        for k in _peaks(strength, sweep.persistence, reach=round(margin / (offsets[1] - offsets[0])))
-        if all(abs(offsets[k] - other) > margin / 2 for other in known)
-        and _crosses_all(sheet.region, m, offsets[k], margin / 4)
+        SeamLine(m, at, at * m + ends[0] * tangent, at * m + ends[1] * tangent, float(strength[k]), sweep.views,
+                 abs(apart) * GAP_SHARE)
+        for k, apart in places for at in [float(offsets[k] + apart / 2)]
+        if all(abs(at - other) > margin / 2 for other in known) and _crosses_all(sheet.region, m, at, margin / 4)
     ]
 
 
@@ -101,6 +105,16 @@ def _peaks(strength: np.ndarray, persistence: np.ndarray, reach: int) -> list[in
     """Places that are strong, persistent, and the strongest within reach."""
     good = np.flatnonzero((strength > LEAST_STRENGTH) & (persistence > LEAST_PERSISTENCE))
     return [int(k) for k in good if strength[k] == strength[max(0, k - reach) : k + reach + 1].max()]
+
+
+def _partner(strength: np.ndarray, k: int, reach: float) -> float:
+    """Steps from a peak to the second line of the same joint, 0 where there is none: eased edges show as two lines."""
+    low, high = max(1, int(k - reach)), min(len(strength) - 1, int(k + reach) + 1)
+    partners = [
+        j for j in range(low, high)
+        if j != k and strength[j] > PARTNER * strength[k] and strength[j] >= max(strength[j - 1], strength[j + 1])
+    ]
+    return float(max(partners, key=lambda j: strength[j]) - k) if partners else 0.0
 
 
 def _known_lines(sheet: Sheet, m: np.ndarray, touching: list[Sheet]) -> list[float]:
@@ -119,11 +133,11 @@ def _known_lines(sheet: Sheet, m: np.ndarray, touching: list[Sheet]) -> list[flo
 
 
 def _crosses_all(region: Polygon, m: np.ndarray, offset: float, reach: float) -> bool:
-    """Whether the line, and lines a little before and after it, run through one stretch of wood: not past a hole or a
-    bay.
+    """Whether lines a little before and after the seam run through one stretch of wood: not past a hole or a bay. The
+    seam itself may be an open slit.
     """
     tangent = np.array([-m[1], m[0]])
-    for shift in (-reach, 0.0, reach):
+    for shift in (-reach, reach):
         middle = (offset + shift) * m
         chord = region.intersection(LineString([middle - 1e5 * tangent, middle + 1e5 * tangent]))
         if chord.geom_type != "LineString" or chord.is_empty:
@@ -154,12 +168,19 @@ def _between(sheet: Sheet, points: np.ndarray, m: np.ndarray, low: float, high: 
     return (across > low) & (across < high)
 
 
-def seam_segments(seam: SeamLine, contact: int) -> tuple[ConstraintSegment, ConstraintSegment]:
-    """Constraint segments for the piece before the seam and the one after it; the wood lies on the left of each."""
+def seam_segments(seam: SeamLine, contact: int | None) -> tuple[ConstraintSegment, ConstraintSegment]:
+    """Constraint segments for the piece before the seam and the one after it; the wood lies on the left of each.
+
+    contact: number of the contact that they make; None where the boards lie side by side with a gap.
+    """
     tangent = np.array([-seam.m[1], seam.m[0]])
     low, high = sorted((seam.start, seam.end), key=lambda p: p @ tangent)
-    before = ConstraintSegment(start=low, end=high, origin="contact", standard_error=0.2, contact=contact)
-    return before, replace(before, start=high, end=low)
+    aside = 0.5 * seam.gap * seam.m
+    origin, error = ("photo", 0.25 * seam.gap) if contact is None else ("contact", 0.2)
+    before = ConstraintSegment(
+        start=low - aside, end=high - aside, origin=origin, standard_error=max(error, 0.2), contact=contact
+    )
+    return before, replace(before, start=high + aside, end=low + aside)
 
 
 def seam_contact(before: Sheet, after: Sheet, seam: SeamLine) -> Contact:

@@ -75,13 +75,16 @@ def _touching(name: str, assembly: Assembly) -> list[Sheet]:
 
 
 def _with_seams(assembly: Assembly, pieces: list[_Piece]) -> Assembly:
-    """The assembly with a contact and constraint segments for every seam between neighbouring pieces."""
+    """The assembly with constraint segments for every seam between neighbouring pieces, and a contact where they touch.
+    """
     contacts, constraints = list(assembly.contacts), [list(c) for c in assembly.constraints]
     for k, piece in enumerate(pieces):
         if piece.seam is None:
             continue
-        before, after = seam_segments(piece.seam, len(contacts))
+        touching = piece.seam.gap == 0
+        before, after = seam_segments(piece.seam, len(contacts) if touching else None)
         constraints[k - 1].append(before)
         constraints[k].append(after)
-        contacts.append(seam_contact(assembly.sheets[k - 1], assembly.sheets[k], piece.seam))
+        if touching:
+            contacts.append(seam_contact(assembly.sheets[k - 1], assembly.sheets[k], piece.seam))
     return replace(assembly, contacts=tuple(contacts), constraints=tuple(tuple(c) for c in constraints))
