@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.assemble.types import Assembly, ConstraintSegment
 from kerfwright.capture.types import Capture
 from kerfwright.identify.types import Parts, Sheet
+
+if TYPE_CHECKING:
+    from kerfwright.assemble.contacts import Decided
 
 __all__ = ["AssembleOptions", "Assembly", "ConstraintSegment", "assemble"]
 
@@ -39,8 +43,9 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     free = see_through(capture, parts.spacing, max(5 * parts.noise, diameter / 150))
     sheets = mended(sheets, capture.cloud, free, options)
     sheets = flush_neighbours(share_thickness(sheets, diameter, options), diameter, options)
+    decided: list[Decided] = []
     for _ in range(options.passes):
-        decided = find_contacts(sheets, capture.cloud, photos, free, options)
+        decided = find_contacts(sheets, capture.cloud, photos, free, options, decided)
         segments = constraint_segments(sheets, decided, diameter, options)
         filled = _run_on(sheets, segments, options.far_reach * diameter)
         if all(a.region.equals(b.region) for a, b in zip(sheets, filled, strict=True)):

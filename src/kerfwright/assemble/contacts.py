@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,9 +63,15 @@ class _Scene:
 
 
 def find_contacts(
-    sheets: tuple[Sheet, ...], cloud: Cloud, photos: Photos, free: FreeSpace, options: AssembleOptions
+    sheets: tuple[Sheet, ...], cloud: Cloud, photos: Photos, free: FreeSpace, options: AssembleOptions,
+    earlier: Sequence[Decided] = (),
 ) -> list[Decided]:
-    """Every pair of boards that meets cut on sheet, with corners decided."""
+    """Every pair of boards that meets cut on sheet, with corners decided.
+
+    earlier : what was found before the regions were run on; its corners stay as they are, for they were decided when
+        less was known that could hide their seams.
+    """
+    settled = {frozenset((d.joint.a, d.joint.b)): d for d in earlier if d.kind == 2}
     scene = _Scene(sheets, cloud, photos, Obstacles(sheets, options.outline_error * cloud.diameter), free, options)
     near, far, doubtful = _all_joints(scene)
     found: list[Decided] = []
@@ -75,7 +82,7 @@ def find_contacts(
             either = [one or (doubtful.get(key) if other and key[::-1] not in near else None)
                       for key, one, other in zip(keys, either, either[::-1], strict=True)]
             if all(either) and any(key in near or key in doubtful for key in keys):
-                found.append(_corner(scene, *either))
+                found.append(_corner(scene, *either, settled.get(frozenset((a, b)))))
             elif any(either):
                 found.append(Decided(either[0] or either[1], 1, None, ContactEvidence()))
             else:
@@ -130,7 +137,7 @@ def _unfinished(scene: _Scene, joint: Joint | None) -> Joint | None:
     end = _end(scene, joint)
     if end is None or end.views < LEAST_VIEWS:
         return joint
-    return None if end.excess < options.end_excess or _ends_before(end, options) else joint
+    return None if end.excess < options.end_excess / 2 or _ends_before(end, options) else joint
 
 
 def _gap_is_free(scene: _Scene, joint: Joint) -> bool:
@@ -204,8 +211,11 @@ def _ends_before(end: End, options: AssembleOptions) -> bool:
     return clear and end.rival_score > max(options.rival_score, end.score)
 
 
-def _corner(scene: _Scene, first: Joint, second: Joint) -> Decided:
+def _corner(scene: _Scene, first: Joint, second: Joint, before: Decided | None) -> Decided:
     """Which of two boards stops: the one whose outer face shows the seam."""
+    if before is not None:
+        joints = (first, second) if before.joint.b == first.b else (second, first)
+        return Decided(joints[0], 2, joints[1], before.evidence)
     seams = [_seam(scene, j, _outer_face(scene, j)) for j in (first, second)]
     chosen = 0 if seams[0].score >= seams[1].score else 1
     margin = seams[chosen].score / max(seams[1 - chosen].score, 1e-6)

@@ -1,7 +1,7 @@
 """Gaps of the cloud filled: holes and bays of a rough region that nobody saw through and no cut face lines.
 
-Stereo thins out in dark corners and leaves regions in rags. Real holes and notches show either what lies behind them or
-their own cut faces.
+Stereo thins out in dark corners and leaves regions in rags. Real holes and notches lie in wood that was seen well, or
+show what lies behind them, or their own cut faces.
 """
 
 from __future__ import annotations
@@ -23,25 +23,37 @@ __all__ = ["mended"]
 
 LINED = 0.15  # of a gap's outline; beyond, cut faces show that it is real
 SEEN = 0.3  # of a gap's area; beyond, it was seen through
+USUAL = 0.75  # quantile of the boards' densities that counts as seen well
+DENSE = 0.6  # of that density: a gap in such wood is real
 SAMPLES = 60
 
 
 def mended(sheets: tuple[Sheet, ...], cloud: Cloud, free: FreeSpace, options: AssembleOptions) -> tuple[Sheet, ...]:
     """The sheets with the gaps in their regions filled that are only gaps of the cloud."""
     reach, near = options.veil * cloud.diameter, options.end_offset * 2 * cloud.diameter
-    return tuple(_mended(sheet, cloud, free, reach, near) for sheet in sheets)
+    usual = float(np.quantile([_face(s, cloud).shape[0] / s.region.area for s in sheets], USUAL))
+    return tuple(_mended(sheet, cloud, free, reach, near, DENSE * usual) for sheet in sheets)
 
 
-def _mended(sheet: Sheet, cloud: Cloud, free: FreeSpace, reach: float, near: float) -> Sheet:
-    """reach: mm, half the width of a gap that is looked at; near: mm about an outline where cut faces line it."""
+def _face(sheet: Sheet, cloud: Cloud) -> np.ndarray:
+    """Points of the sheet face that was seen better, board frame, (N, 2)."""
+    return sheet.to_board(cloud.points[max(sheet.top_idx, sheet.bottom_idx, key=len)])[:, :2]
+
+
+def _mended(sheet: Sheet, cloud: Cloud, free: FreeSpace, reach: float, near: float, dense: float) -> Sheet:
+    """reach: mm, half the width of a gap that is looked at; near: mm about an outline where cut faces line it; dense:
+    points a mm2 of a face seen well.
+    """
     closed = sheet.region.buffer(reach, join_style="mitre").buffer(-reach, join_style="mitre").union(sheet.region)
     whole = shapely.union_all([closed, *(Polygon(ring) for ring in sheet.region.interiors)])
     outline, gaps = whole.boundary, whole.difference(sheet.region)
     cut = sheet.to_board(cloud.points[sheet.cut_idx])[:, :2]
     tree = cKDTree(cut) if len(cut) else None
+    face = _face(sheet, cloud)
     fill = [
         gap for gap in getattr(gaps, "geoms", [gaps])
-        if gap.area > 1.0 and not _is_lined(gap, sheet.region, outline, tree, near) and not _is_seen(gap, sheet, free)
+        if gap.area > 1.0 and not _is_lined(gap, sheet.region, outline, tree, near)
+        and not _is_seen(gap, sheet, free) and _is_thin(gap, sheet.region, face, near, dense)
     ]
     if not fill:
         return sheet
@@ -65,6 +77,12 @@ def _is_lined(
         return False
     distance, _ = tree.query(shapely.get_coordinates(inner))
     return float((distance < near).mean()) > LINED
+
+
+def _is_thin(gap: Polygon, region: Polygon, face: np.ndarray, near: float, dense: float) -> bool:
+    """Whether the wood round the gap was seen badly."""
+    ring = gap.buffer(2 * near).intersection(region)
+    return bool(shapely.contains_xy(ring, face[:, 0], face[:, 1]).sum() < dense * ring.area)
 
 
 def _is_seen(gap: Polygon, sheet: Sheet, free: FreeSpace) -> bool:
