@@ -67,7 +67,7 @@ def prepare(capture: Capture, options: PrepareOptions | None = None) -> Capture:
     capture = _boxed(capture, options.box) if options.box else capture
     capture, floor = _levelled(capture, options)
     if options.crop:
-        capture = _cropped(capture, floor)
+        capture = _cropped(_straight(capture), floor)  # what is a stray must not depend on how the capture is turned
     capture, ground = (capture, floor.offset) if floor else _stood_on_floor(capture, options)
     capture = _straight(capture)
     low, high = np.percentile(capture.cloud.points[:, :2], (0.1, 99.9), axis=0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from kerfwright.assemble import AssembleOptions, assemble
+from kerfwright.assemble.apart import kept_apart
 from kerfwright.assemble.outlines import constrained_region
 from kerfwright.assemble.splits import SeamLine, find_seam_lines, seam_contact, seam_segments, split_sheet
 from kerfwright.assemble.types import Assembly
@@ -50,7 +51,7 @@ def refined_assembly(
         pieces = _split(pieces, assembly, capture)
     named = [replace(p, sheet=replace(p.sheet, name=f"board_{k + 1:02d}")) for k, p in enumerate(pieces)]
     again = assemble(replace(parts, sheets=tuple(p.sheet for p in named)), capture, EXACT)
-    return tuple(p.outline for p in named), _with_seams(again, named)
+    return tuple(p.outline for p in named), kept_apart(_with_seams(again, named), diameter)
 
 
 def _split(pieces: list[_Piece], assembly: Assembly, capture: Capture) -> list[_Piece]:
