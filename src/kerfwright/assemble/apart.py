@@ -20,7 +20,7 @@ CLEARANCE = 1 / 2000  # of D, between a board and what it was cut off from
 
 
 def kept_apart(assembly: Assembly, diameter: float) -> Assembly:
-    """The assembly, its regions cut back where they run a little into boards without a contact; smaller boards yield."""
+    """The assembly, regions cut back where they run a little into boards without a contact; smaller boards yield."""
     meeting = {frozenset((c.a, c.b)) for c in assembly.contacts}
     sheets = list(assembly.sheets)
     for k in np.argsort([s.region.area for s in sheets], kind="stable"):

@@ -28,6 +28,7 @@ __all__ = ["improve", "score"]
 MOST_TRIALS = 40
 
 FILLET_REACH = 80.0  # mm that the nodes of a curve may move when it becomes a fillet
+SHORTEST_SIDE = 1e-6  # mm; of a line beside a fillet
 SHARPEST_FILLET = 0.1  # radians between lines below which their corner is nowhere
 LONGEST_SPLIT = 60.0  # mm: longer curves are no corners
 MOST_TURN = 0.7  # radians: a sharp node that turns more is not tried smooth
@@ -265,7 +266,10 @@ def _fillet(shape: Shape, move: _Move, samples: Samples) -> tuple[np.ndarray, np
         return None
     a, b = shape.node(before), shape.node(after)
     u, v = shape.node(before + 1) - a, shape.node(after + 1) - b
-    u, v = u / np.linalg.norm(u), v / np.linalg.norm(v)
+    lengths = np.linalg.norm(u), np.linalg.norm(v)
+    if min(lengths) < SHORTEST_SIDE:
+        return None
+    u, v = u / lengths[0], v / lengths[1]
     turn = float(np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v))
     if not SHARPEST_FILLET < abs(turn) < SPIKE:
         return None
