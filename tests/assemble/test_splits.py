@@ -1,0 +1,58 @@
+"""Seams between boards that were seen as one: pieces, segments, contacts."""
+
+import numpy as np
+import pytest
+from shapely.geometry import box
+
+from clouds import sheet
+from kerfwright.assemble.splits import SeamLine, _crosses_all, _partner, seam_contact, seam_segments, split_sheet
+
+ACROSS = np.array([1.0, 0.0])
+WIDE = sheet("wide", np.eye(4), 20.0, (0, 0, 300, 100), top_idx=np.arange(6))
+POINTS = np.array([[x, 50.0, 20.0] for x in (10, 60, 110, 160, 210, 260)])
+
+
+def seam(at: float, gap: float = 0.0) -> SeamLine:
+    return SeamLine(ACROSS, at, np.array([at, 0.0]), np.array([at, 100.0]), 8.0, 6, gap)
+
+
+def test_pieces_share_out_the_board_and_its_points():
+    pieces = split_sheet(WIDE, [seam(100), seam(200)], POINTS)
+    assert [p.region.bounds for p in pieces] == [(0, 0, 100, 100), (100, 0, 200, 100), (200, 0, 300, 100)]
+    assert [list(p.top_idx) for p in pieces] == [[0, 1], [2, 3], [4, 5]]
+
+
+def test_segments_have_each_piece_on_their_left():
+    for segment, inside in zip(seam_segments(seam(100), 3), ([50, 50], [150, 50]), strict=True):
+        along, to = segment.end - segment.start, np.array(inside) - segment.start
+        assert along[0] * to[1] - along[1] * to[0] > 0
+        assert (segment.origin, segment.contact) == ("contact", 3)
+
+
+def test_boards_with_a_gap_end_either_side_of_its_middle():
+    before, after = seam_segments(seam(100, gap=4.0), None)
+    assert (before.start[0], after.start[0]) == (98, 102)
+    assert {before.origin, after.origin} == {"photo"}
+
+
+def test_the_contact_of_two_pieces_is_edge_to_edge():
+    one, other = split_sheet(WIDE, [seam(100)], POINTS)
+    contact = seam_contact(one, other, seam(100))
+    assert (contact.type, contact.face_a, contact.face_b) == (4, "edge", "edge")
+    assert contact.area == pytest.approx(2000)
+    assert contact.point[0] == pytest.approx(100)
+
+
+def test_a_seam_crosses_the_whole_board():
+    holed = box(0, 0, 300, 100).difference(box(80, 40, 120, 60))
+    assert _crosses_all(WIDE.region, ACROSS, 100, 10)
+    assert not _crosses_all(holed, ACROSS, 100, 10)
+    slit = box(0, 0, 300, 100).difference(box(99, 5, 101, 100))
+    assert _crosses_all(slit, ACROSS, 100, 10)
+
+
+def test_two_lines_side_by_side_are_one_joint():
+    strength = np.ones(60)
+    strength[[20, 28, 50]] = 10, 9, 9.5
+    assert _partner(strength, 20, 12) == 8
+    assert _partner(strength, 50, 12) == 0
