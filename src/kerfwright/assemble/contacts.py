@@ -221,7 +221,7 @@ def _corner(scene: _Scene, first: Joint, second: Joint, before: Decided | None) 
     margin = seams[chosen].score / max(seams[1 - chosen].score, 1e-6)
     evidence = ContactEvidence(
         seam_score=seams[chosen].score, seam_score_other=seams[1 - chosen].score, views=seams[chosen].views,
-        decided_by="seam" if margin >= CLEAR_MARGIN else "default",
+        decided_by="seam" if margin >= CLEAR_MARGIN and seams[chosen].score >= LEAST_SEAM else "default",
     )
     joints = (first, second)
     return Decided(joints[chosen], 2, joints[1 - chosen], evidence)
