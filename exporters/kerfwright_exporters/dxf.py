@@ -134,6 +134,7 @@ def dxf_bytes(document: Any, name: str) -> bytes:
         If ezdxf's audit finds a fault.
     """
     _show_all(document)
+    _name_classes(document)
     auditor = document.audit()
     if auditor.has_errors or auditor.has_fixes:
         faults = "; ".join(str(e.message) for e in (*auditor.errors, *auditor.fixes))
@@ -149,10 +150,17 @@ def _show_all(document: Any) -> None:
     from ezdxf import bbox, zoom
 
     space = document.modelspace()
-    box = bbox.extents(space, fast=True)
+    cuts = [entity for entity in space if entity.dxftype() != "TEXT"]  # texts are as wide as the fonts of the machine
+    box = bbox.extents(cuts, fast=True)
     if box.has_data:
         space.reset_extents(box.extmin, box.extmax)
         zoom.window(space, box.extmin, box.extmax)
+
+
+def _name_classes(document: Any) -> None:
+    """Register the classes in order: ezdxf's own writer takes them out of a set, another order in each process."""
+    for dxftype in sorted(document.entitydb.dxf_types_in_use()):
+        document.classes.add_class(dxftype)
 
 
 @contextmanager

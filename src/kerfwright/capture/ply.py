@@ -134,13 +134,12 @@ def _code(kind: np.dtype) -> str:
 
 def _ascii_columns(file: BinaryIO, header: PlyHeader, index: int, wanted: list[int]) -> list[np.ndarray]:
     """Columns of the element; colours of whole numbers keep their type."""
-    text = io.TextIOWrapper(file, encoding="latin-1")
-    for element in header.elements[:index]:
-        _pass_over(text, element)
     element = header.elements[index]
-    table = _ascii_table(
-        _without_lists(text, element) if element.has_lists else filter(str.strip, text), element, wanted, header.path
-    )
+    with io.TextIOWrapper(file, encoding="latin-1") as text:
+        for before in header.elements[:index]:
+            _pass_over(text, before)
+        lines = _without_lists(text, element) if element.has_lists else filter(str.strip, text)
+        table = _ascii_table(lines, element, wanted, header.path)
     if len(table) < element.count:
         raise _cut_short(header, element, len(table))
     kinds = [element.properties[i].kind for i in wanted]
