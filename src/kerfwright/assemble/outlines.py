@@ -13,6 +13,7 @@ from kerfwright.assemble.types import ConstraintSegment
 
 __all__ = ["constrained_region", "filled_region", "largest_piece", "segment_axes"]
 
+CRACK = 0.01  # mm
 SHALLOW = 0.12  # of the reach: how much deeper than usual a column may be and still be filled
 
 
@@ -33,8 +34,13 @@ def filled_region(region: Polygon, segments: tuple[ConstraintSegment, ...], reac
     """The region run on to each segment over its length, by at most `reach` mm."""
     for segment in segments:
         filled = shapely.union_all([region, *_filling(region, segment, reach)])
-        region = largest_piece(filled.buffer(0.01).buffer(-0.01))
+        region = largest_piece(_closed(filled))
     return region
+
+
+def _closed(shape) -> Polygon:
+    """The shape without cracks thinner than twice `CRACK`, and without vertices that say nothing."""
+    return shape.buffer(CRACK, join_style="mitre").buffer(-CRACK, join_style="mitre").simplify(CRACK / 2)
 
 
 def segment_axes(segment: ConstraintSegment) -> tuple[np.ndarray, np.ndarray, float]:

@@ -24,7 +24,7 @@ class Obstacles:
         self._scene = o3d.t.geometry.RaycastingScene()
         for sheet in sheets:
             depth = min(shrink, 0.4 * sheet.thickness.value)
-            for piece in _parts(sheet.region.buffer(-shrink, join_style="mitre")):
+            for piece in _parts(sheet.region.buffer(-shrink, join_style="mitre").simplify(shrink / 10)):
                 corners = _slab(piece, depth, sheet.thickness.value - depth)
                 triangles = np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
                 self._scene.add_triangles(

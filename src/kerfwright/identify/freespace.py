@@ -7,6 +7,7 @@ surface clearly behind it. Nothing drawn means nothing known: the cloud has hole
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.ndimage import minimum_filter
@@ -14,6 +15,9 @@ from scipy.ndimage import minimum_filter
 from kerfwright.capture.types import Capture, View
 
 __all__ = ["FreeSpace", "see_through"]
+
+# maps of captures in use, by the size of a pixel: every stage asks for the same
+_DRAWN: WeakKeyDictionary[Capture, dict[float, tuple[np.ndarray, ...]]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,10 +48,12 @@ def _cells(pixels: np.ndarray, pixel: float, shape: tuple[int, int]) -> tuple[np
 
 def see_through(capture: Capture, spacing: float, margin: float) -> FreeSpace:
     """Depth maps of the cloud in every view; spacing: mm between neighbouring points of the cloud."""
-    cloud = capture.cloud
     pixel = _map_pixel(capture, spacing)
-    maps = tuple(_depth_map(view, cloud.points, cloud.normals, pixel) for view in capture.views)
-    return FreeSpace(capture.views, maps, pixel, margin)
+    drawn = _DRAWN.setdefault(capture, {})
+    if pixel not in drawn:
+        cloud = capture.cloud
+        drawn[pixel] = tuple(_depth_map(view, cloud.points, cloud.normals, pixel) for view in capture.views)
+    return FreeSpace(capture.views, drawn[pixel], pixel, margin)
 
 
 def _map_pixel(capture: Capture, spacing: float) -> float:
@@ -69,9 +75,18 @@ def _depth_map(view: View, points: np.ndarray, normals: np.ndarray, pixel: float
     pixels, depth = view.project(points)
     row, column, inside = _cells(pixels, pixel, shape)
     flat = row[inside] * shape[1] + column[inside]
-    order = np.argsort(depth[inside], kind="stable")
-    cell, first = np.unique(flat[order], return_index=True)
-    nearest = order[first]
+    nearest = _nearest(flat, depth[inside], shape[0] * shape[1])
+    cell = flat[nearest]
     drawn = np.full(shape[0] * shape[1], -np.inf, np.float32)
     drawn[cell] = np.where(facing[inside][nearest], depth[inside][nearest], -np.inf)
     return minimum_filter(drawn.reshape(shape), size=3, mode="constant", cval=-np.inf)
+
+
+def _nearest(cell: np.ndarray, depth: np.ndarray, cells: int) -> np.ndarray:
+    """Index of the point of least depth, and of those the first, in every cell that has points."""
+    least = np.full(cells, np.inf)
+    np.minimum.at(least, cell, depth)
+    first = np.full(cells, len(cell))
+    front = np.flatnonzero(depth == least[cell])
+    first[cell[front[::-1]]] = front[::-1]
+    return first[first < len(cell)]

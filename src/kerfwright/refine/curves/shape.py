@@ -8,13 +8,15 @@ bulge up to and beyond the half circle. Smooth nodes and guide lines are equatio
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from kerfwright.refine.curves.ranges import ARC, CUBIC, LINE
+from kerfwright.refine.curves.feet import LEAST_BULGE, WIDTH, edge_residuals
+from kerfwright.refine.curves.ranges import ARC, CUBIC
 from kerfwright.refine.curves.snap import GuideLine
 
-__all__ = ["Shape", "end_turn", "equations", "feet", "residuals"]
+__all__ = ["Shape", "end_turn", "equations", "residuals"]
 
 EXTRA = {ARC: 1, CUBIC: 4}
 _RIGHT = np.array([[0.0, 1.0], [-1.0, 0.0]])  # turns a vector to its right: where a counter-clockwise arc bows to
@@ -49,13 +51,20 @@ class Shape:
 
     def extra(self, k: int) -> slice:
         """Where the inner unknowns of edge k lie."""
-        before = 2 * self.count + sum(EXTRA.get(kind, 0) for kind in self.kinds[:k])
-        return slice(before, before + EXTRA.get(self.kinds[k], 0))
+        own = self.columns(k)[4:]
+        return slice(own[0], own[-1] + 1) if len(own) else slice(0, 0)
 
     def columns(self, k: int) -> np.ndarray:
         """Indices of all unknowns of edge k: its nodes, then its own."""
-        nxt, own = (k + 1) % self.count, self.extra(k)
-        return np.array([2 * k, 2 * k + 1, 2 * nxt, 2 * nxt + 1, *range(own.start, own.stop)])
+        return _columns(self.kinds)[k]
+
+    @cached_property
+    def edges(self) -> np.ndarray:
+        """(n, WIDTH) unknowns of every edge, in the order of `columns`, the rest zero."""
+        rows = np.zeros((self.count, WIDTH))
+        for row, columns in zip(rows, _columns(self.kinds), strict=True):
+            row[: len(columns)] = self.unknowns[columns]
+        return rows
 
     def moved(self, unknowns: np.ndarray) -> Shape:
         """The same structure with other unknowns."""
@@ -75,131 +84,26 @@ class Shape:
 
 
 def _bounded(bulge: float) -> float:
-    return float(np.copysign(max(abs(bulge), 1e-6), bulge))
+    return float(np.copysign(max(abs(bulge), LEAST_BULGE), bulge))
 
 
-def feet(shape: Shape, k: int, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Parameters (M,) of the nearest points on edge k, left normals (M, 2) there, and signed distances (M,), left
-    positive.
-
-    Beyond the edge's ends the normal is the way to the point, so that the distance is the whole one.
-    """
-    if shape.kinds[k] == LINE:
-        return _line_feet(shape.node(k), shape.node(k + 1), points)
-    t = _arc_feet(shape, k, points) if shape.kinds[k] == ARC else _cubic_feet(shape.controls(k), points)
-    velocity = _velocity(shape, k, t)
-    velocity /= np.maximum(np.hypot(velocity[:, 0], velocity[:, 1]), 1e-12)[:, None]
-    normal = np.column_stack([-velocity[:, 1], velocity[:, 0]])
-    return t, *_outward(points - _position(shape, k, t), normal, t)
-
-
-def _line_feet(a: np.ndarray, b: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    d = b - a
-    length = max(float(np.hypot(*d)), 1e-9)
-    t = np.clip((points - a) @ d / length**2, 0, 1)
-    normal = np.repeat(np.array([[-d[1], d[0]]]) / length, len(points), axis=0)
-    return t, *_outward(points - a - t[:, None] * d, normal, t)
-
-
-def _outward(gap: np.ndarray, normal: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Normals, turned towards the points beyond the ends, and distances along them."""
-    distance = (gap * normal).sum(axis=1)
-    end = np.flatnonzero((t <= 0) | (t >= 1))
-    far = np.hypot(gap[end, 0], gap[end, 1])
-    end, far = end[far > 1e-9], far[far > 1e-9]
-    signed = np.where(distance[end] < 0, -far, far)
-    normal[end], distance[end] = gap[end] / signed[:, None], signed
-    return normal, distance
+@lru_cache(maxsize=256)
+def _columns(kinds: tuple[int, ...]) -> tuple[np.ndarray, ...]:
+    """Indices of the unknowns of every edge: its nodes, then its own."""
+    found, own = [], 2 * len(kinds)
+    for k, kind in enumerate(kinds):
+        after, more = (k + 1) % len(kinds), EXTRA.get(kind, 0)
+        found.append(np.array([2 * k, 2 * k + 1, 2 * after, 2 * after + 1, *range(own, own + more)]))
+        own += more
+    return tuple(found)
 
 
 def residuals(shape: Shape, k: int, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Signed distances (M,) of points to edge k and their derivatives (M, C) by the unknowns `columns(k)`."""
-    t, normal, distance = feet(shape, k, points)
-    if shape.kinds[k] == LINE:
-        return distance, -np.hstack([normal * (1 - t)[:, None], normal * t[:, None]])
-    if shape.kinds[k] == CUBIC:
-        basis = _bernstein(t)[:, [0, 3, 1, 2]]
-        return distance, -(basis[:, :, None] * normal[:, None, :]).reshape(len(t), 8)
-    return distance, -np.einsum("md,mdc->mc", normal, _arc_derivative(shape, k, t))
-
-
-def _bernstein(t: np.ndarray) -> np.ndarray:
-    s = 1 - t
-    return np.column_stack([s**3, 3 * s * s * t, 3 * s * t * t, t**3])
-
-
-def _position(shape: Shape, k: int, t: np.ndarray) -> np.ndarray:
-    if shape.kinds[k] == CUBIC:
-        return _bernstein(t) @ shape.controls(k)
-    a, b = shape.node(k), shape.node(k + 1)
-    weights, middle = _arc_weights(shape, k, t)
-    top = weights[:, :1] * a + weights[:, 1:2] * middle + weights[:, 2:3] * b
-    return top / weights[:, 3:]
-
-
-def _arc_weights(shape: Shape, k: int, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Basis (M, 4) of the rational quadratic, its last column the denominator, and the weighted middle control
-    point.
+    """Signed distances (M,), left positive, of points to edge k and their derivatives (M, C) by the unknowns
+    `columns(k)`.
     """
-    a, b = shape.node(k), shape.node(k + 1)
-    half = 2 * np.arctan(_bounded(shape.unknowns[shape.extra(k)][0]))
-    middle = np.cos(half) * (a + b) / 2 + np.sin(half) / 2 * (_RIGHT @ (b - a))
-    s = 1 - t
-    return np.column_stack([s * s, 2 * s * t, t * t, s * s + 2 * s * t * np.cos(half) + t * t]), middle
-
-
-def _arc_feet(shape: Shape, k: int, points: np.ndarray) -> np.ndarray:
-    centre, _, start, sweep = shape.arc(k)
-    angle = np.arctan2(points[:, 1] - centre[1], points[:, 0] - centre[0]) - start
-    angle = np.mod(angle * np.sign(sweep), 2 * np.pi)
-    beyond = angle > abs(sweep)
-    late = angle - abs(sweep) < 2 * np.pi - angle
-    part = np.where(beyond, np.where(late, 1.0, 0.0), angle / abs(sweep))
-    half = abs(sweep) / 2
-    up, down = np.sin(part * half), np.sin((1 - part) * half)
-    return np.where(part <= 0, 0.0, np.where(part >= 1, 1.0, up / np.maximum(up + down, 1e-15)))
-
-
-def _cubic_feet(control: np.ndarray, points: np.ndarray) -> np.ndarray:
-    grid = np.linspace(0, 1, 21)
-    at = _bernstein(grid) @ control
-    t = grid[((points[:, None] - at[None]) ** 2).sum(axis=2).argmin(axis=1)]
-    d1, d2 = 3 * np.diff(control, axis=0), 6 * np.diff(control, 2, axis=0)
-    for _ in range(4):
-        s = 1 - t
-        gap = _bernstein(t) @ control - points
-        v = np.column_stack([s * s, 2 * s * t, t * t]) @ d1
-        a = np.column_stack([s, t]) @ d2
-        slope = (v * v).sum(axis=1) + np.maximum((gap * a).sum(axis=1), -0.5 * (v * v).sum(axis=1))
-        t = np.clip(t - (gap * v).sum(axis=1) / np.maximum(slope, 1e-12), 0, 1)
-    return t
-
-
-def _velocity(shape: Shape, k: int, t: np.ndarray) -> np.ndarray:
-    """Direction of travel (M, 2), of any length."""
-    if shape.kinds[k] == CUBIC:
-        d = np.diff(shape.controls(k), axis=0)
-        s = 1 - t
-        return np.column_stack([s * s, 2 * s * t, t * t]) @ d
-    centre, _, _, sweep = shape.arc(k)
-    spoke = _position(shape, k, t) - centre
-    return np.sign(sweep) * np.column_stack([-spoke[:, 1], spoke[:, 0]])
-
-
-def _arc_derivative(shape: Shape, k: int, t: np.ndarray) -> np.ndarray:
-    """(M, 2, 5) derivatives of the points at parameters t by the nodes and the bulge of arc k."""
-    eye = np.eye(2)
-    weights, _ = _arc_weights(shape, k, t)
-    bulge = _bounded(shape.unknowns[shape.extra(k)][0])
-    half, rate = 2 * np.arctan(bulge), 2 / (1 + bulge**2)
-    c, s = np.cos(half), np.sin(half)
-    a, b = shape.node(k), shape.node(k + 1)
-    w = weights / weights[:, 3:]
-    by_start = w[:, 0, None, None] * eye + w[:, 1, None, None] * (c / 2 * eye - s / 2 * _RIGHT)
-    by_end = w[:, 2, None, None] * eye + w[:, 1, None, None] * (c / 2 * eye + s / 2 * _RIGHT)
-    middle = rate * (-s * (a + b) / 2 + c / 2 * (_RIGHT @ (b - a)))
-    by_bulge = w[:, 1:2] * (middle + rate * s * _position(shape, k, t))
-    return np.concatenate([by_start, by_end, by_bulge[..., None]], axis=2)
+    distance, slope = edge_residuals(shape.kinds[k], shape.edges[k], np.ascontiguousarray(points))
+    return distance, slope[:, : len(shape.columns(k))]
 
 
 def _end_directions(shape: Shape, k: int) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kerfwright.refine.curves.ranges import CUBIC
+from kerfwright.refine.curves.feet import assigned, normal_sums
 from kerfwright.refine.curves.samples import Samples
-from kerfwright.refine.curves.shape import Shape, equations, feet, residuals
+from kerfwright.refine.curves.shape import Shape, equations
 from kerfwright.refine.curves.snap import GuideLine
 
 __all__ = ["Equations", "Fit", "constrained_step", "distances", "normal_equations", "solve", "taken_stock"]
@@ -44,38 +44,8 @@ def distances(shape: Shape, samples: Samples) -> tuple[np.ndarray, np.ndarray]:
     """Signed distance (N,) and edge (N,) of each sample: of its range's edge, or near a node of the neighbour if
     nearer.
     """
-    best = np.full(samples.count, np.inf)
-    edge = np.zeros(samples.count, int)
     reach = samples.steps(NODE_REACH)
-    for own in (True, False):
-        for k in range(shape.count):
-            mine = _own(shape, k, samples.count) if own else _beyond(shape, k, samples.count, reach)
-            if not len(mine):
-                continue
-            signed = feet(shape, k, samples.points[mine])[2]
-            better = np.abs(signed) < np.abs(best[mine]) - 1e-6
-            best[mine[better]], edge[mine[better]] = signed[better], k
-    return best, edge
-
-
-def _own(shape: Shape, k: int, count: int) -> np.ndarray:
-    return np.arange(*shape.ranges[k]) % count
-
-
-def _beyond(shape: Shape, k: int, count: int, reach: int) -> np.ndarray:
-    """Samples of the neighbouring edges next to edge k's nodes."""
-    if shape.count < 2:
-        return np.zeros(0, int)
-    before, after = shape.ranges[k - 1], shape.ranges[(k + 1) % shape.count]
-    return (
-        np.concatenate(
-            [
-                np.arange(max(before[0], before[1] - reach), before[1]),
-                np.arange(after[0], min(after[1], after[0] + reach)),
-            ]
-        )
-        % count
-    )
+    return assigned(np.array(shape.kinds), shape.edges, np.array(shape.ranges), samples.points, reach)
 
 
 def solve(
@@ -124,34 +94,15 @@ def _merit(robust: float, violation: np.ndarray, samples: Samples) -> float:
 def normal_equations(shape: Shape, samples: Samples) -> tuple[np.ndarray, np.ndarray, float]:
     """Normal matrix and right side of the robust least squares, and the robust chi-square."""
     unknowns = len(shape.unknowns)
-    normal, right, chi2 = np.zeros((unknowns, unknowns)), np.zeros(unknowns), 0.0
-    _, edge = distances(shape, samples)
+    normal, right = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
+    edge = distances(shape, samples)[1]
+    kinds, points = np.array(shape.kinds), samples.points
+    blocks, sides, chi2 = normal_sums(kinds, shape.edges, edge, points, samples.sigma, samples.weight, ROBUST)
     for k in range(shape.count):
-        mine = np.flatnonzero(edge == k)
-        if not len(mine):
-            continue
-        r, slope = residuals(shape, k, samples.points[mine])
-        ratio = 1 + (r / (ROBUST * samples.sigma[mine])) ** 2
-        weight = samples.weight[mine] / ratio**2
-        chi2 += float((samples.weight[mine] * r**2 / ratio).sum())
         columns = shape.columns(k)
-        normal[np.ix_(columns, columns)] += slope.T @ (weight[:, None] * slope)
-        right[columns] -= slope.T @ (weight * r)
-    for k in range(shape.count):
-        if shape.kinds[k] == CUBIC:
-            _handles(shape, k, normal, right)
+        normal[np.ix_(columns, columns)] += blocks[k, : len(columns), : len(columns)]
+        right[columns] += sides[k, : len(columns)]
     return normal, right, chi2
-
-
-def _handles(shape: Shape, k: int, normal: np.ndarray, right: np.ndarray) -> None:
-    """A weak pull of control points towards thirds of the chord: nothing else holds them along a flat curve."""
-    columns, control = shape.columns(k), shape.controls(k)
-    chord = max(float(np.linalg.norm(control[3] - control[0])), 1e-6)
-    for row, thirds in ((4, 1 / 3), (6, 2 / 3)):
-        target = control[0] + thirds * (control[3] - control[0])
-        for d in range(2):
-            normal[columns[row + d], columns[row + d]] += 0.25 / chord**2
-            right[columns[row + d]] += 0.25 / chord**2 * (target[d] - shape.unknowns[columns[row + d]])
 
 
 def constrained_step(
