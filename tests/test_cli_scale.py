@@ -36,6 +36,8 @@ def kerfwright(monkeypatch, capsys):
         (["--length", "top"], "--length: top: give BOARD:AXIS=LENGTH"),
         (["--length", "top:x=4mm", "--length", "top:y"], "--length: top:y: give BOARD:AXIS=LENGTH"),
         (["--markers", "40mm"], "--markers: 40mm: give FAMILY:SIDE"),
+        (["--stock", "oak"], "--stock: 'oak': neither a table nor a thickness: give metric, inch, or"),
+        (["--stock", "12,,18"], "--stock: '': neither a table nor a thickness"),
         (["--crop", "half"], "--crop: half: give auto, none, or the box"),
         (["--crop", "0,0,0,1,1,-1"], "--crop: 0,0,0,1,1,-1: give auto"),
         (["--ground", "low"], "'--ground'"),

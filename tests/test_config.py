@@ -12,7 +12,7 @@ def test_the_file_written_is_the_defaults_and_reads_back(tmp_path):
     path = tmp_path / "config.toml"
     path.write_text(default_config())
     assert read_config(path) == {
-        "reconstruct": {"up": "z", "markers": "", "seed": 0, "quiet": False, "verbose": False},
+        "reconstruct": {"up": "z", "markers": "", "stock": "", "seed": 0, "quiet": False, "verbose": False},
     }
     assert set(tomllib.loads(default_config())) == CONFIGURABLE
 

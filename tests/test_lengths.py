@@ -2,8 +2,8 @@
 
 import pytest
 
-from kerfwright.commands.lengths import length, size
 from kerfwright.errors import OptionError
+from kerfwright.lengths import length, size
 
 
 @pytest.mark.parametrize(

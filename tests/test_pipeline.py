@@ -86,5 +86,42 @@ def test_the_model_says_where_it_lies_and_what_it_came_from():
     assert (origin.points, origin.images) == (5, 0)
     assert origin.options == {
         "up": "z", "millimetres_per_unit": None, "seed": 3, "crop": "auto", "ground": None, "length": "", "markers": "",
-        "scale_by_stock": False,
+        "scale_by_stock": False, "stock": "",
     }  # fmt: skip
+
+
+def refined_with(monkeypatch, options: ReconstructOptions, origin: str = "assumed"):
+    """Refinement of one board of 100 x 50 x 17.9 units of half a millimetre, and the stock that each fit was told."""
+    from kerfwright import refine
+    from kerfwright.model import Quantity
+    from simple import board, rectangle
+
+    told = []
+
+    def fit_traced(pieces, parts, capture, settings):
+        told.append(settings.stock.sizes)
+        made = board(rectangle(100, 50), "shelf").model_copy(update={"thickness": Quantity(value=17.9)})
+        return refine.Refined((made,), ())
+
+    monkeypatch.setattr(refine, "trace", lambda *_: ())
+    monkeypatch.setattr(refine, "fit_traced", fit_traced)
+    found = capture(origin)
+    parts = Parts(sheets=(), primitives=(), noise=0.1)
+    return pipeline._refine(None, parts, found, options), told
+
+
+def test_stock_sizes_reach_the_stages_in_their_units(monkeypatch):
+    """A working unit of this capture is 0.002 of its units of 500 mm: a millimetre."""
+    refined, told = refined_with(monkeypatch, ReconstructOptions(stock="12,18"), "given")
+    assert told == [pytest.approx((12.0, 18.0))] and refined.scale_factor is None
+
+
+def test_nothing_is_snapped_at_an_assumed_scale_or_unasked(monkeypatch):
+    assert refined_with(monkeypatch, ReconstructOptions(stock="12,18"))[1] == [()]
+    assert refined_with(monkeypatch, ReconstructOptions(), "given")[1] == [()]
+
+
+def test_measured_lengths_fix_the_scale_before_thicknesses_are_snapped(monkeypatch):
+    refined, told = refined_with(monkeypatch, ReconstructOptions(stock="36", length="shelf:x=200mm"))
+    assert told == [(), pytest.approx((18.0,))]
+    assert refined.scale_factor == pytest.approx(2.0)

@@ -28,6 +28,7 @@ def reconstruct(
     millimetres_per_unit: float | None = None,
     lengths: Sequence[str] = (),
     markers: str = "",
+    stock: str = "",
     crop: str = "auto",
     ground: float | None = None,
     seed: int = 0,
@@ -41,6 +42,7 @@ def reconstruct(
     millimetres_per_unit : of the capture; None takes a unit for a metre.
     lengths : measured lengths that give the scale instead, such as "top:x=420mm".
     markers : markers in the photographs that give the scale instead, such as "4x4_50:40mm".
+    stock : thicknesses to snap to where the scale is given: "metric", "inch", or a list such as "12,18,1/2in".
     crop : "auto", "none", or the box to keep in the cloud's coordinates: "X0,Y0,Z0,X1,Y1,Z1".
     ground : height of the floor along the up axis, capture units; None looks for it.
     seed : of the random generator.
@@ -54,6 +56,6 @@ def reconstruct(
 
     options = ReconstructOptions(
         up=up, millimetres_per_unit=millimetres_per_unit, seed=seed, crop=crop, ground=ground, length=";".join(lengths),
-        markers=markers,
+        markers=markers, stock=stock,
     )  # fmt: skip
     return run(capture, options).model

@@ -25,6 +25,7 @@ _OPTIONS: dict[str, dict[str, tuple[type | tuple[type, ...], str | None, str]]] 
         "up": (str, '"z"', "axis of the capture that is up: x, y, z, -x, -y, -z"),
         "scale": ((int, float, str), None, "millimetres a capture unit, or auto; not set: a unit is a metre"),
         "markers": (str, '""', "markers in the photographs and their side, such as 4x4_50:40mm; empty: none"),
+        "stock": (str, '""', "thicknesses to snap to: metric, inch, or a list as 12,18,1/2in; empty: none"),
         "seed": (int, "0", "of the random generator"),
         "jobs": (int, None, "cores to use; not set: all"),
         "quiet": (bool, "false", "say nothing but errors"),

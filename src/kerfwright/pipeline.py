@@ -20,6 +20,7 @@ from kerfwright.progress import Reporter
 if TYPE_CHECKING:
     import numpy as np
 
+    from kerfwright.assemble import Stock
     from kerfwright.assemble.types import Assembly
     from kerfwright.capture.types import Capture
     from kerfwright.identify.types import Parts
@@ -47,6 +48,7 @@ class ReconstructOptions:
     length : measured lengths that give the scale, semicolons between them; see `kerfwright.scaling.parse_lengths`.
     markers : markers that give the scale; see `kerfwright.capture.markers.parse_markers`.
     scale_by_stock : take the scale at which most boards are of a stock thickness.
+    stock : thicknesses to snap to where the scale is known; see `kerfwright.stock.parse_stock`. Empty: none.
     """
 
     up: str = "z"
@@ -57,6 +59,7 @@ class ReconstructOptions:
     length: str = ""
     markers: str = ""
     scale_by_stock: bool = False
+    stock: str = ""
 
 
 @dataclass(frozen=True)
@@ -180,15 +183,44 @@ def _assemble(parts: Parts, capture: Capture, options: ReconstructOptions) -> As
 
 
 def _refine(assembly: Assembly, parts: Parts, capture: Capture, options: ReconstructOptions) -> Refined:
-    from kerfwright.refine import RefineOptions, refine
+    from dataclasses import replace
 
-    return refine(assembly, parts, capture, RefineOptions(seed=options.seed))
+    from kerfwright.refine import RefineOptions, fit_traced, trace
+    from kerfwright.stock import scale_is_known
+
+    settings = RefineOptions(seed=options.seed)
+    pieces = trace(assembly, parts, capture, settings)
+    if not options.stock or not scale_is_known(capture.scale, options.length):
+        return fit_traced(pieces, parts, capture, settings)
+    factor = None
+    if options.length:
+        factor = _length_factor(_model(fit_traced(pieces, parts, capture, settings), parts, capture, options), options)
+    settings = replace(settings, stock=_working_stock(capture, options.stock, factor))
+    return replace(fit_traced(pieces, parts, capture, settings), scale_factor=factor)
+
+
+def _length_factor(model: Model, options: ReconstructOptions) -> float:
+    from kerfwright.scaling import length_factor, parse_lengths
+
+    return length_factor(model, parse_lengths(options.length.split(";")))
+
+
+def _working_stock(capture: Capture, stock: str, factor: float | None) -> Stock:
+    """Stock sizes in the stages' working units; `factor` makes the capture's millimetres those of measured lengths."""
+    from kerfwright.assemble import Stock
+    from kerfwright.stock import parse_stock
+
+    unit = (factor or 1.0) / _world_from_model(capture)[0, 0]
+    scale = capture.scale
+    error = 0.0 if factor is not None else (scale.standard_error or 0.0) / scale.millimetres_per_unit
+    return Stock(tuple(size.value / unit for size in parse_stock(stock)), error)
 
 
 def _check(refined: Refined, parts: Parts, capture: Capture, options: ReconstructOptions) -> Model:
     from kerfwright.solid import CheckOptions, check
 
-    model = _scaled_by_boards(_model(refined, parts, capture, options), options)
+    model = _scaled_by_boards(_model(refined, parts, capture, options), options, refined.scale_factor)
+    model = _with_stock(model, options)
     return model.model_copy(update={"findings": (*model.findings, *check(model, CheckOptions()))})
 
 
@@ -228,12 +260,22 @@ def _model(refined: Refined, parts: Parts, capture: Capture, options: Reconstruc
     )
 
 
-def _scaled_by_boards(model: Model, options: ReconstructOptions) -> Model:
+def _with_stock(model: Model, options: ReconstructOptions) -> Model:
+    """The model with snapped thicknesses named, and told which are not."""
+    from kerfwright.stock import labelled, parse_stock, scale_is_known, unsnapped_findings
+
+    sizes = parse_stock(options.stock)
+    boards = labelled(model.boards, sizes)
+    told = unsnapped_findings(boards, sizes, scale_is_known(model.scale, options.length))
+    return model.model_copy(update={"boards": boards, "findings": (*model.findings, *told)})
+
+
+def _scaled_by_boards(model: Model, options: ReconstructOptions, factor: float | None = None) -> Model:
     """The model at the scale that its boards give, where that was asked for."""
     from kerfwright.scaling import parse_lengths, scaled_by_lengths, scaled_by_stock
 
     if options.length:
-        return scaled_by_lengths(model, parse_lengths(options.length.split(";")))
+        return scaled_by_lengths(model, parse_lengths(options.length.split(";")), factor)
     return scaled_by_stock(model) if options.scale_by_stock else model
 
 

@@ -14,7 +14,7 @@ from kerfwright.model.frames import rows
 from kerfwright.model.geometry import sample_loop
 from kerfwright.model.resize import resized_board, resized_contact
 
-__all__ = ["Length", "parse_lengths", "scaled_by_lengths", "scaled_by_stock"]
+__all__ = ["Length", "length_factor", "parse_lengths", "scaled_by_lengths", "scaled_by_stock"]
 
 UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 AXES = {"x": 0, "length": 0, "y": 1, "width": 1, "z": 2, "thickness": 2}
@@ -74,8 +74,20 @@ def _parsed(text: str) -> Length:
     return Length(found[1], found[2], value)
 
 
-def scaled_by_lengths(model: Model, lengths: Sequence[Length]) -> Model:
-    """The model at the scale that these lengths give; of several, the mean, weighted by their lengths.
+def length_factor(model: Model, lengths: Sequence[Length]) -> float:
+    """By which the model must grow to have these lengths; of several, the mean, weighted by their lengths.
+
+    Raises
+    ------
+    OptionError
+        If a board is not there.
+    """
+    found = np.array([_measured(model, length) for length in lengths])
+    return float(found @ np.array([length.value for length in lengths]) / (found @ found))
+
+
+def scaled_by_lengths(model: Model, lengths: Sequence[Length], factor: float | None = None) -> Model:
+    """The model at the scale that these lengths give, or at a factor that they gave before thicknesses were snapped.
 
     Raises
     ------
@@ -84,7 +96,7 @@ def scaled_by_lengths(model: Model, lengths: Sequence[Length]) -> Model:
     """
     found = np.array([_measured(model, length) for length in lengths])
     given = np.array([length.value for length in lengths])
-    factor = float(found @ given / (found @ found))
+    factor = length_factor(model, lengths) if factor is None else factor
     residuals = factor * found - given
     told = ", ".join(f"{n.text} ({round(r, 2) + 0.0:+.2f})" for n, r in zip(lengths, residuals, strict=True))
     error = float(np.sqrt(residuals @ residuals / (len(given) - 1) / (found @ found))) if len(given) > 1 else None

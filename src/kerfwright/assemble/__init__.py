@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from kerfwright.assemble.options import AssembleOptions
+from kerfwright.assemble.options import AssembleOptions, Stock
 from kerfwright.assemble.types import Assembly, ConstraintSegment
 from kerfwright.capture.types import Capture
 from kerfwright.identify.types import Parts, Sheet
@@ -13,7 +13,7 @@ from kerfwright.identify.types import Parts, Sheet
 if TYPE_CHECKING:
     from kerfwright.assemble.contacts import Decided
 
-__all__ = ["AssembleOptions", "Assembly", "ConstraintSegment", "assemble"]
+__all__ = ["AssembleOptions", "Assembly", "ConstraintSegment", "Stock", "assemble"]
 
 
 def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = None) -> Assembly:
@@ -27,6 +27,7 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     from kerfwright.assemble.contacts import find_contacts, to_contact
     from kerfwright.assemble.flush import flush_neighbours
     from kerfwright.assemble.gaps import mended
+    from kerfwright.assemble.snap import moved_with, snapped_to_stock
     from kerfwright.assemble.stock import share_thickness
     from kerfwright.assemble.veils import still_open, unveiled
     from kerfwright.identify.freespace import see_through
@@ -51,6 +52,11 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
         if all(a.region.equals(b.region) for a, b in zip(sheets, filled, strict=True)):
             break
         sheets = filled
+    if options.stock.sizes:
+        sheets = flush_neighbours(snapped_to_stock(sheets, decided, parts.noise, options), diameter, options)
+        decided = moved_with(sheets, decided)
+        segments = constraint_segments(sheets, decided, diameter, options)
+        sheets = _run_on(sheets, segments, options.far_reach * diameter)
     contacts = tuple(to_contact(d, sheets) for d in decided)
     edges = still_open(edges, segments)
     return Assembly(sheets, contacts, tuple(a + b for a, b in zip(segments, edges, strict=True)))

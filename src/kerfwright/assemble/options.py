@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["AssembleOptions"]
+__all__ = ["AssembleOptions", "Stock"]
+
+
+@dataclass(frozen=True)
+class Stock:
+    """Thicknesses that boards are sold in, in the stages' units; none where the scale is not known."""
+
+    sizes: tuple[float, ...] = ()
+    scale_error: float = 0.0  # relative standard error of the scale
 
 
 @dataclass(frozen=True)
@@ -17,6 +25,8 @@ class AssembleOptions:
     square_floor_degrees: float = 0.35  # poses and stereo drift by this much
     direction_sigmas: float = 3.0
     thickness_sigmas: float = 3.0
+    stock: Stock = Stock()
+    stock_sigmas: float = 2.0  # standard errors within which exactly one stock size must lie
     thickness_floor: float = 1 / 1500  # least standard error of a thickness: eased edges hide part of it
     flush: float = 1 / 1000  # sheet planes of neighbours that differ by less are one
     ground_reach: float = 1 / 40  # a board that comes this near the floor stands on it

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kerfwright.commands.lengths import length, size
+from kerfwright.lengths import length, size
 
 if TYPE_CHECKING:
     from kerfwright.model import Finding

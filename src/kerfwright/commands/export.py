@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kerfwright.commands.check import SHEET, Sheet, Tool, model_file
-from kerfwright.commands.lengths import length, size
 from kerfwright.commands.reconstruct import say_errors
+from kerfwright.lengths import length, size
 
 if TYPE_CHECKING:
     from kerfwright_exporters import ExportOptions

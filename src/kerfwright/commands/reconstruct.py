@@ -51,6 +51,13 @@ Lengths = Annotated[
 Markers = Annotated[
     str, typer.Option("--markers", metavar="FAMILY:SIDE", help="Printed markers in the photographs, as 4x4_50:40mm.")
 ]
+StockSizes = Annotated[
+    str,
+    typer.Option(
+        "--stock", metavar="metric|inch|LIST",
+        help="Snap thicknesses to what is sold, or to your own, as 12,18,1/2in, where the scale is given.",
+    ),
+]
 Crop = Annotated[
     str,
     typer.Option("--crop", metavar="auto|none|BOX", help="Box to keep: X0,Y0,Z0,X1,Y1,Z1 in the cloud's coordinates."),
@@ -75,6 +82,7 @@ def reconstruct(
     scale: ScaleMm = None,
     length: Lengths = None,
     markers: Markers = "",
+    stock: StockSizes = "",
     crop: Crop = "auto",
     ground: Ground = None,
     seed: Seed = 0,
@@ -88,7 +96,7 @@ def reconstruct(
     options = ReconstructOptions(
         up=checked_axis(up), millimetres_per_unit=checked_scale(scale), seed=seed, crop=checked_crop(crop),
         ground=ground, length=_checked_lengths(length or []), markers=_checked_markers(markers),
-        scale_by_stock=scale == AUTO,
+        scale_by_stock=scale == AUTO, stock=_checked_stock(stock),
     )  # fmt: skip
     _limit_threads(jobs)
     reporter = reporter_for(sys.stdout if as_json else sys.stderr, quiet=quiet, as_json=as_json, verbose=verbose)
@@ -194,6 +202,14 @@ def _checked_markers(markers: str) -> str:
 
         parse_markers(markers)
     return markers
+
+
+def _checked_stock(stock: str) -> str:
+    if stock:
+        from kerfwright.stock import parse_stock
+
+        parse_stock(stock)
+    return stock
 
 
 def _check_one_scale(scale: str | None, lengths: Sequence[str] | None, markers: str) -> None:

@@ -4,13 +4,19 @@ Refinement).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 from kerfwright.assemble.types import Assembly
 from kerfwright.capture.types import Capture
 from kerfwright.identify.types import Parts
 from kerfwright.refine.options import Refined, RefineOptions
 from kerfwright.refine.types import BoundaryLoop, Outline
 
-__all__ = ["BoundaryLoop", "Outline", "RefineOptions", "Refined", "refine"]
+if TYPE_CHECKING:
+    from kerfwright.refine.alternate import Piece
+
+__all__ = ["BoundaryLoop", "Outline", "RefineOptions", "Refined", "fit_traced", "refine", "trace"]
 
 
 def refine(assembly: Assembly, parts: Parts, capture: Capture, options: RefineOptions | None = None) -> Refined:
@@ -18,9 +24,21 @@ def refine(assembly: Assembly, parts: Parts, capture: Capture, options: RefineOp
 
     Raises StageError when a cut path cannot be fitted.
     """
-    from kerfwright.refine.alternate import refined_assembly
+    options = options or RefineOptions()
+    return fit_traced(trace(assembly, parts, capture, options), parts, capture, options)
+
+
+def trace(assembly: Assembly, parts: Parts, capture: Capture, options: RefineOptions) -> tuple[Piece, ...]:
+    """The first half of `refine`: every board's outline in the photographs."""
+    from kerfwright.refine.alternate import traced_pieces
+
+    return traced_pieces(assembly, parts, capture, options)
+
+
+def fit_traced(pieces: Sequence[Piece], parts: Parts, capture: Capture, options: RefineOptions) -> Refined:
+    """The second half: contacts found again, and cut paths. `options.stock` may be another than when tracing."""
+    from kerfwright.refine.alternate import assembled_again
     from kerfwright.refine.finish import finished
 
-    options = options or RefineOptions()
-    outlines, assembly = refined_assembly(assembly, parts, capture, options)
+    outlines, assembly = assembled_again(pieces, parts, capture, options)
     return finished(outlines, assembly, capture, options)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from kerfwright.assemble import AssembleOptions, assemble
@@ -19,14 +20,14 @@ from kerfwright.refine.options import RefineOptions
 from kerfwright.refine.segment import SegmentOptions, segment_boards
 from kerfwright.refine.types import Outline
 
-__all__ = ["refined_assembly"]
+__all__ = ["assembled_again", "traced_pieces"]
 
 # outlines from photographs are this much better than the cloud's
 EXACT = AssembleOptions(rough=False, outline_error=1 / 200, reach=1 / 60)
 
 
 @dataclass(frozen=True, eq=False)
-class _Piece:
+class Piece:
     """A board after the photographs, the outline it came from, and the seam to the piece before it."""
 
     sheet: Sheet
@@ -34,10 +35,10 @@ class _Piece:
     seam: SeamLine | None = None
 
 
-def refined_assembly(
+def traced_pieces(
     assembly: Assembly, parts: Parts, capture: Capture, options: RefineOptions
-) -> tuple[tuple[Outline, ...], Assembly]:
-    """One outline a board and the assembly found with them."""
+) -> tuple[Piece, ...]:
+    """The boards with what the photographs show of their outlines; those with seams in them taken apart."""
     diameter = capture.cloud.diameter
     free = see_through(capture, parts.spacing, max(5 * parts.noise, diameter / 150))
     segmenting = SegmentOptions(use_images=options.use_images)
@@ -46,19 +47,26 @@ def refined_assembly(
     for sheet, segments, board in zip(assembly.sheets, assembly.constraints, found, strict=True):
         for outline in board.outlines:
             region = constrained_region(outline_region(outline), segments, diameter / 6, diameter / 20)
-            pieces.append(_Piece(replace(sheet, region=region), outline))
+            pieces.append(Piece(replace(sheet, region=region), outline))
     if options.use_images:
         pieces = _split(pieces, assembly, capture)
-    named = [replace(p, sheet=replace(p.sheet, name=f"board_{k + 1:02d}")) for k, p in enumerate(pieces)]
-    again = assemble(replace(parts, sheets=tuple(p.sheet for p in named)), capture, EXACT)
-    return tuple(p.outline for p in named), kept_apart(_with_seams(again, named), diameter)
+    return tuple(replace(p, sheet=replace(p.sheet, name=f"board_{k + 1:02d}")) for k, p in enumerate(pieces))
 
 
-def _split(pieces: list[_Piece], assembly: Assembly, capture: Capture) -> list[_Piece]:
+def assembled_again(
+    pieces: Sequence[Piece], parts: Parts, capture: Capture, options: RefineOptions
+) -> tuple[tuple[Outline, ...], Assembly]:
+    """One outline a board and the assembly found with them."""
+    found = replace(parts, sheets=tuple(p.sheet for p in pieces))
+    again = assemble(found, capture, replace(EXACT, stock=options.stock))
+    return tuple(p.outline for p in pieces), kept_apart(_with_seams(again, pieces), capture.cloud.diameter)
+
+
+def _split(pieces: list[Piece], assembly: Assembly, capture: Capture) -> list[Piece]:
     """Pieces with the boards that show seams taken apart."""
     diameter, photos = capture.cloud.diameter, Photos(capture)
     obstacles = Obstacles([p.sheet for p in pieces], diameter / 100)
-    out: list[_Piece] = []
+    out: list[Piece] = []
     for piece in pieces:
         touching = _touching(piece.sheet.name, assembly)
         seams = find_seam_lines(piece.sheet, touching, photos, obstacles, diameter)
@@ -66,7 +74,7 @@ def _split(pieces: list[_Piece], assembly: Assembly, capture: Capture) -> list[_
             out.append(piece)
             continue
         sheets = split_sheet(piece.sheet, seams, capture.cloud.points)
-        out += [_Piece(s, piece.outline, seam) for s, seam in zip(sheets, [None, *seams], strict=True)]
+        out += [Piece(s, piece.outline, seam) for s, seam in zip(sheets, [None, *seams], strict=True)]
     return out
 
 
@@ -75,7 +83,7 @@ def _touching(name: str, assembly: Assembly) -> list[Sheet]:
     return [s for s in assembly.sheets if s.name in names]
 
 
-def _with_seams(assembly: Assembly, pieces: list[_Piece]) -> Assembly:
+def _with_seams(assembly: Assembly, pieces: Sequence[Piece]) -> Assembly:
     """The assembly with constraint segments for every seam between neighbouring pieces, and a contact where they touch.
     """
     contacts, constraints = list(assembly.contacts), [list(c) for c in assembly.constraints]

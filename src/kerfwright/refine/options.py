@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from kerfwright.assemble import Stock
 from kerfwright.model import Board, Contact, Finding
 
 __all__ = ["RefineOptions", "Refined"]
@@ -15,6 +16,7 @@ class RefineOptions:
 
     use_images: bool = True  # false: cut paths come from the cloud alone
     boundary_step: float = 1 / 450  # spacing of boundary points handed to curve fitting
+    stock: Stock = field(default_factory=Stock)  # thicknesses to snap to, in the stages' units
     seed: int = 0
 
 
@@ -25,3 +27,4 @@ class Refined:
     boards: tuple[Board, ...]
     contacts: tuple[Contact, ...]
     findings: tuple[Finding, ...] = ()
+    scale_factor: float | None = None  # that measured lengths gave before thicknesses were snapped at it
