@@ -49,6 +49,16 @@ def test_a_boundary_that_cannot_be_fitted_becomes_a_polygon_and_says_so(monkeypa
     assert refined.boards[0].notes
 
 
+def test_boards_that_are_alike_come_out_as_one_kind():
+    regions = [Polygon([(0, 0), (200, 0), (160, 120), (0, 120)]), box(0, 0, 150, 60)]
+    regions.append(Polygon([(0, 0), (120, 0), (120, 160), (0, 200)]))  # the first, turned over and round
+    sheets = tuple(sheet(f"board_{k}", pose((0, 0, 50 * k)), 18.0, r) for k, r in enumerate(regions))
+    assembly = Assembly(sheets, (), ((), (), ()))
+    refined = finish.finished(tuple(map(outline_of, regions)), assembly, CAPTURE, RefineOptions())
+    assert [(b.same_as, b.mirrored) for b in refined.boards] == [(None, False), (None, False), ("board_0", True)]
+    assert path_polygon(refined.boards[2].cut_path).area == pytest.approx(path_polygon(refined.boards[0].cut_path).area)
+
+
 def test_findings_of_the_assembly_are_handed_on():
     known = Finding(code="K002", severity="info", message="seen")
     assert finished(box(0, 0, 200, 120), findings=(known,)).findings[0] == known

@@ -4,6 +4,8 @@ from.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from kerfwright.assemble.types import ConstraintSegment
@@ -11,10 +13,39 @@ from kerfwright.identify.types import Sheet
 from kerfwright.model import Arc, Bevel, Board, Circle, CutPath, Line, Origin, Quantity
 from kerfwright.model.frames import rows
 from kerfwright.model.geometry import transform_path
+from kerfwright.refine.types import Fitted, Twin
 
-__all__ = ["to_board"]
+__all__ = ["to_board", "to_boards"]
 
 ON_SEGMENT = 0.05  # mm; fitted edges lie on their constraint segments to rounding
+
+
+def to_boards(fitted: Sequence[Fitted]) -> tuple[Board, ...]:
+    """The boards of the model. A twin's cut path is that of the first of its kind, or its mirror image, to the bit."""
+    out: list[Board] = []
+    for board in fitted:
+        if board.twin is None:
+            out.append(to_board(board.sheet, board.path, board.segments, board.origin, board.notes))
+        else:
+            out.append(_repeat(board, board.twin, fitted[board.twin.first], out[board.twin.first]))
+    return tuple(out)
+
+
+def _repeat(board: Fitted, twin: Twin, first: Fitted, model: Board) -> Board:
+    """A board in the frame that the first of its kind has on it; of a mirror image, x runs the other way."""
+    turn, shift = _own_frame(first.path)
+    motion = twin.first_from_own
+    turn, shift = turn @ motion[:, :2], shift - turn @ motion[:, 2]
+    path = model.cut_path
+    if twin.mirrored:
+        width = max(p[0] for e in path.outer.edges for p in _points_of(e))
+        flip = np.array([[-1.0, 0.0, width], [0.0, 1.0, 0.0]])
+        path = transform_path(path, flip)
+        turn, shift = flip[:, :2] @ turn, flip[:, :2] @ shift - flip[:, 2]
+    made = _framed(board.sheet, board.path, path, (turn, shift), board.segments)
+    return made.model_copy(update={
+        "outline_origin": board.origin, "notes": board.notes, "same_as": first.sheet.name, "mirrored": twin.mirrored,
+    })  # fmt: skip
 
 
 def to_board(
@@ -22,15 +53,24 @@ def to_board(
 ) -> Board:
     """A board with +x along its longest straight edge and the cut path's lower left corner at the origin."""
     turn, shift = _own_frame(path)
+    made = _framed(sheet, path, transform_path(path, np.c_[turn, -shift]), (turn, shift), segments)
+    return made.model_copy(update={"outline_origin": origin, "notes": notes})
+
+
+def _framed(
+    sheet: Sheet, path: CutPath, own_path: CutPath, frame: tuple[np.ndarray, np.ndarray],
+    segments: tuple[ConstraintSegment, ...],
+) -> Board:
+    """A board in the frame x_in_board = turn @ x_in_sheet - shift; `path` in the sheet's frame, `own_path` in that."""
+    turn, shift = frame
     model_from_board = sheet.world_from_board.copy()
     model_from_board[:3, 3] += sheet.world_from_board[:3, :2] @ (turn.T @ shift)
     model_from_board[:3, :2] = sheet.world_from_board[:3, :2] @ turn.T
     bevels = [_bevel(path, s, sheet, turn, shift) for s in segments if s.normal is not None]
     points = len(sheet.top_idx) + len(sheet.bottom_idx) + len(sheet.cut_idx)
     return Board(
-        name=sheet.name, model_from_board=rows(model_from_board), thickness=sheet.thickness,
-        cut_path=transform_path(path, np.c_[turn, -shift]),
-        bevels=tuple(b for b in bevels if b is not None), outline_origin=origin, points=points, notes=notes,
+        name=sheet.name, model_from_board=rows(model_from_board), thickness=sheet.thickness, cut_path=own_path,
+        bevels=tuple(b for b in bevels if b is not None), points=points,
     )
 
 

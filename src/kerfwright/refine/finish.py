@@ -12,13 +12,14 @@ from kerfwright.assemble.outlines import constrained_region
 from kerfwright.assemble.types import Assembly, ConstraintSegment
 from kerfwright.capture.types import Capture
 from kerfwright.errors import StageError
-from kerfwright.model import Board, CutPath, Finding, Line, Loop
+from kerfwright.model import CutPath, Finding, Line, Loop
 from kerfwright.model.geometry import edge_length
-from kerfwright.refine.boards import to_board
+from kerfwright.refine.boards import to_boards
 from kerfwright.refine.constrain import to_loops
 from kerfwright.refine.curves import fit_curves
 from kerfwright.refine.options import Refined, RefineOptions
-from kerfwright.refine.types import Outline
+from kerfwright.refine.twins import with_twins
+from kerfwright.refine.types import Fitted, Outline
 
 __all__ = ["finished"]
 
@@ -28,36 +29,33 @@ SMOOTHED = "spurs of the boundary were left out: it was too rough to fit as trac
 
 def finished(outlines: tuple[Outline, ...], assembly: Assembly, capture: Capture, options: RefineOptions) -> Refined:
     """Fit every cut path on its constraint segments."""
-    boards, findings = [], []
-    for number, outline in enumerate(outlines):
-        board, notes = _board(number, outline, assembly, capture.cloud.diameter, options)
-        boards.append(board)
-        findings += [
-            Finding(code="K010", severity="warning", message=f"{board.name}: {note}", boards=(board.name,))
-            for note in notes
-        ]
-    return Refined(tuple(boards), assembly.contacts, (*assembly.findings, *findings))
+    fitted = with_twins([_fitted(k, outline, assembly, capture.cloud.diameter, options)
+                         for k, outline in enumerate(outlines)])  # fmt: skip
+    boards = to_boards(fitted)
+    findings = [
+        Finding(code="K010", severity="warning", message=f"{board.name}: {note}", boards=(board.name,))
+        for board in boards for note in board.notes
+    ]
+    return Refined(boards, assembly.contacts, (*assembly.findings, *findings))
 
 
-def _board(
-    number: int, outline: Outline, assembly: Assembly, diameter: float, options: RefineOptions
-) -> tuple[Board, tuple[str, ...]]:
+def _fitted(number: int, outline: Outline, assembly: Assembly, diameter: float, options: RefineOptions) -> Fitted:
     sheet, segments = assembly.sheets[number], assembly.constraints[number]
     region = constrained_region(sheet.region, segments, diameter / 6, diameter / 20)
     step = options.boundary_step * diameter
     attempts = [(region, ()), (_smoothed(region, segments, diameter), (SMOOTHED,))]
     problem = ""
     for shape, remarks in attempts:
+        loops = to_loops(shape, outline, segments, step)
         try:
-            fit = fit_curves(to_loops(shape, outline, segments, step), segments)
+            fit = fit_curves(loops, segments)
             _refuse_short_edges(fit.path)
         except StageError as error:
             problem = str(error)
             continue
-        notes = (*fit.notes, *remarks)
-        return to_board(sheet, fit.path, segments, outline.origin, notes), notes
+        return Fitted(sheet, segments, loops, fit.path, outline.origin, (*fit.notes, *remarks))
     notes = (f"the cut path is a plain polygon: {problem}",)
-    return to_board(sheet, polygon_path(region, step), segments, outline.origin, notes), notes
+    return Fitted(sheet, segments, loops, polygon_path(region, step), outline.origin, notes)
 
 
 def _smoothed(region: Polygon, segments: tuple[ConstraintSegment, ...], diameter: float) -> Polygon:
