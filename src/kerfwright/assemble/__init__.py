@@ -27,6 +27,7 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     from kerfwright.assemble.contacts import find_contacts, to_contact
     from kerfwright.assemble.flush import flush_neighbours
     from kerfwright.assemble.gaps import mended
+    from kerfwright.assemble.laid import laid_contacts, laid_on
     from kerfwright.assemble.snap import moved_with, snapped_to_stock
     from kerfwright.assemble.stock import share_thickness
     from kerfwright.assemble.veils import still_open, unveiled
@@ -44,6 +45,7 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     free = see_through(capture, parts.spacing, max(5 * parts.noise, diameter / 150))
     sheets = mended(sheets, capture.cloud, free, options)
     sheets = flush_neighbours(share_thickness(sheets, diameter, options), diameter, options)
+    sheets = laid_on(sheets, capture.cloud, free, options)
     decided: list[Decided] = []
     for _ in range(options.passes):
         decided = find_contacts(sheets, capture.cloud, photos, free, options, decided)
@@ -57,7 +59,9 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
         decided = moved_with(sheets, decided)
         segments = constraint_segments(sheets, decided, diameter, options)
         sheets = _run_on(sheets, segments, options.far_reach * diameter)
-    contacts = tuple(to_contact(d, sheets) for d in decided)
+        sheets = laid_on(sheets, capture.cloud, free, options)
+    laid = laid_contacts(sheets, options.min_contact * diameter)
+    contacts = (*(to_contact(d, sheets) for d in decided), *laid)
     edges = still_open(edges, segments)
     return Assembly(sheets, contacts, tuple(a + b for a, b in zip(segments, edges, strict=True)))
 

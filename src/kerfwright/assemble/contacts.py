@@ -22,6 +22,7 @@ from kerfwright.model import Contact, ContactEvidence
 __all__ = ["Decided", "find_contacts", "to_contact"]
 
 LEAST_SEAM = 1.35  # a visible seam is at least this much stronger than the face beside it
+AS_CLEAR = 0.8  # of the score of the edge at the plane
 LEAST_VIEWS = 3  # photographs that must show an edge for it to decide anything
 MOST_SPOILT = 0.3  # of a gap may be seen through, or taken by another board
 CLEAR_MARGIN = 1.25  # ratio of seam scores from which a corner counts as decided by the photographs
@@ -137,7 +138,7 @@ def _unfinished(scene: _Scene, joint: Joint | None) -> Joint | None:
     end = _end(scene, joint)
     if end is None or end.views < LEAST_VIEWS:
         return joint
-    return None if end.excess < options.end_excess / 2 or _ends_before(end, options) else joint
+    return None if end.excess < options.end_excess / 2 or _ends_before(scene, joint, end) else joint
 
 
 def _gap_is_free(scene: _Scene, joint: Joint) -> bool:
@@ -195,7 +196,7 @@ def _confirmed(scene: _Scene, joint: Joint | None) -> Decided | None:
     end = _end(scene, joint)
     if end is None or end.views < LEAST_VIEWS:
         return None
-    if end.excess < scene.options.end_excess or _ends_before(end, scene.options):
+    if end.excess < scene.options.end_excess or _ends_before(scene, joint, end):
         return None
     return Decided(joint, 1, None, ContactEvidence(seam_score=end.score, views=end.views, decided_by="seam"))
 
@@ -205,10 +206,15 @@ def _end(scene: _Scene, joint: Joint) -> End | None:
     return look_for_end(scene.sheets, joint, scene.photos, scene.obstacles, window, fringe)
 
 
-def _ends_before(end: End, options: AssembleOptions) -> bool:
-    """Whether the photographs show an edge before the plane that is clear, and clearer than the one at the plane."""
+def _ends_before(scene: _Scene, joint: Joint, end: End) -> bool:
+    """Whether the photographs show an edge before the plane that is clear, and clearer than the one at the plane.
+
+    Where the outline stops, one as clear will do: lines behind the board run at the plane's height as well.
+    """
+    options = scene.options
     clear = end.views >= LEAST_VIEWS and end.rival_excess > 2 * options.end_excess
-    return clear and end.rival_score > max(options.rival_score, end.score)
+    here = abs(end.rival_offset - joint.gap) < scene.mm(options.veil)
+    return clear and end.rival_score > max(options.rival_score, end.score * (AS_CLEAR if here else 1.0))
 
 
 def _corner(scene: _Scene, first: Joint, second: Joint, before: Decided | None) -> Decided:

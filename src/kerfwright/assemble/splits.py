@@ -118,9 +118,10 @@ def _partner(strength: np.ndarray, k: int, reach: float) -> float:
 
 
 def _known_lines(sheet: Sheet, m: np.ndarray, touching: list[Sheet]) -> list[float]:
-    """Offsets of the lines in which the sheet planes of touching boards cut this board."""
+    """Offsets of the lines in which the sheet planes and the ends of touching boards meet this board."""
     lines = []
     for other in touching:
+        lines += _ends_on(sheet, m, other)
         n = other.normal @ sheet.world_from_board[:3, :3]
         flat = float(np.hypot(n[0], n[1]))
         if flat < 0.2 or abs(n[:2] @ m) < 0.98 * flat:
@@ -130,6 +131,16 @@ def _known_lines(sheet: Sheet, m: np.ndarray, touching: list[Sheet]) -> list[flo
         for plane in (0.0, other.thickness.value):
             lines += [sign * (base + plane - n[2] * z) / flat for z in (0.0, sheet.thickness.value)]
     return lines
+
+
+def _ends_on(sheet: Sheet, m: np.ndarray, other: Sheet) -> list[float]:
+    """Between which two offsets another board's end lies on this one."""
+    ring = np.asarray(other.region.exterior.coords)[:, :2]
+    corners = np.concatenate([np.c_[ring, np.full(len(ring), z)] for z in (0.0, other.thickness.value)])
+    x = sheet.to_board(other.to_world(corners))
+    reach = sheet.thickness.value / 2
+    across = x[(x[:, 2] > -reach) & (x[:, 2] < sheet.thickness.value + reach), :2] @ m
+    return [float(across.min()), float(across.max())] if len(across) else []
 
 
 def _crosses_all(region: Polygon, m: np.ndarray, offset: float, reach: float) -> bool:

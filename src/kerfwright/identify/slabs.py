@@ -13,6 +13,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from kerfwright.capture.types import Capture
+from kerfwright.identify.bars import find_bars
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.options import IdentifyOptions
 from kerfwright.identify.photo_edges import Photos
@@ -89,7 +90,32 @@ def candidate_slabs(
         if not hypotheses and scene.is_broad(seed[2]):
             rough = [slab for h in stock for slab in _slabs(scene, *seed, h)]
             found.extend(piece for slab in rough for piece in _without_others(scene, slab, found))
-    return _distinct(found)
+    return _distinct([*found, *_bars(scene, found)])
+
+
+def _bars(scene: _Scene, known: list[Slab]) -> list[Slab]:
+    """Bars that no candidate with evidence of its own holds already, and that nobody saw through."""
+    known = [slab for slab in known if slab.thickness.evidence != "inferred"]
+    found: list[Slab] = []
+    if not known:  # a bar is a hidden part of something: opposite patches of a ball are none
+        return found
+    for bar in find_bars(scene.capture, scene.around, scene.planes, scene.photos, scene.options):
+        ends = [scene.capture.cloud.points[scene.planes[k].point_idx] for k in bar.ends]
+        if any(all(_holds(scene, slab, end) for end in ends) for slab in known):
+            continue
+        free = _free_share(scene, bar.world_from_board, bar.thickness.value, bar.region)
+        if free <= scene.options.max_free:
+            found.append(Slab(bar.world_from_board, bar.thickness, bar.region, (), (), free))
+    return found
+
+
+def _holds(scene: _Scene, slab: Slab, points: np.ndarray) -> bool:
+    """Whether most of the points lie on the slab, or in it."""
+    x = slab.to_board(points)
+    reach = scene.fringe / 2
+    inside = (x[:, 2] > -reach) & (x[:, 2] < slab.thickness.value + reach)
+    near = shapely.distance(slab.region, shapely.points(x[:, :2])) < reach
+    return bool((inside & near).mean() > 0.5)
 
 
 def _without_others(scene: _Scene, slab: Slab, others: list[Slab]) -> list[Slab]:

@@ -32,7 +32,7 @@ class ThicknessHypothesis:
 
     value: float
     standard_error: float
-    evidence: str  # "opposite", "photos", "cut", "ground" or "inferred"
+    evidence: str  # "opposite", "photos", "cut", "ground", "ends" or "inferred"
     support: float  # mm2 of overlap, edge strength, or share of the outline
 
     def near(self, value: float) -> bool:
