@@ -20,6 +20,7 @@ __all__ = ["Contour", "agree", "best_motion", "contour_of", "moved_points"]
 SAMPLES = 360
 STARTS = 6  # turns that are tried: a rectangle has two, a square four
 STEPS = 12
+LEAST_LIMIT = 0.05  # mm; what has to lie exactly is no outlier before
 WINDOW = 9  # samples over which a local difference is averaged
 LOCAL_SIGMAS = 3.0  # by which that average may differ: a notch that only one of two boards has
 WHOLE_SIGMAS = 1.5  # ... and a stretch from corner to corner: many samples agree on it
@@ -123,7 +124,8 @@ def _refined(
         x = moved_points(motion, b.points)
         distance, normal, k = a.across(x)
         error = np.hypot(error_a[k], error_b)
-        root = np.sqrt(np.minimum(1.0, 2.0 / np.maximum(np.abs(distance) / error, 1e-12))) / error
+        limit = np.maximum(2.0 * error, LEAST_LIMIT)
+        root = np.sqrt(limit / np.maximum(np.abs(distance), limit)) / error
         cost = float(np.mean((root * distance) ** 2))
         lever = x - centre
         slope = np.column_stack([normal, normal[:, 1] * lever[:, 0] - normal[:, 0] * lever[:, 1]])

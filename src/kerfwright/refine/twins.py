@@ -21,7 +21,7 @@ from kerfwright.refine.types import BoundaryLoop, Fitted, Twin
 __all__ = ["with_twins"]
 
 EXACT = 0.01  # mm by which a joint path may miss a plane that a board ends on
-HELD = EXACT / 2  # standard error of a boundary point on such a plane, when outlines are laid on each other
+HELD = EXACT / 1000  # standard error of a boundary point on such a plane, when outlines are laid on each other
 ON_SEGMENT = 0.05  # mm; fitted edges and boundaries lie on their segments to rounding
 ONE_PLANE = 1.0  # mm; segments of twins that lie nearer belong to the same edge
 COVERED = 0.95  # share of a contact's edge that the joint path must have as well
