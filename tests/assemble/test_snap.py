@@ -106,3 +106,11 @@ def test_boards_still_end_on_each_other_when_all_are_of_another_thickness(shelve
 def test_the_underside_that_the_uprights_hold_to_stays(shelves):
     low = [next(s for s in found.sheets if abs(s.normal[2]) > 0.99).world_from_board[2, 3] for found in shelves]
     assert low[0] == pytest.approx(low[1], abs=1e-9)
+
+
+def test_stock_that_fits_nothing_changes_nothing(shelves):
+    """Not even by running outlines on once more: that leaves slivers that no cut path fits."""
+    other = assemble(shelf_parts(), shelf_capture(), AssembleOptions(stock=Stock((99.0,))))
+    for one, same in zip(shelves[0].sheets, other.sheets, strict=True):
+        assert one.region.equals(same.region) and one.thickness == same.thickness
+        assert np.array_equal(one.world_from_board, same.world_from_board)

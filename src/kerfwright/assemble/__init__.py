@@ -58,7 +58,6 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
         sheets = flush_neighbours(snapped_to_stock(sheets, decided, parts.noise, options), diameter, options)
         decided = moved_with(sheets, decided)
         segments = constraint_segments(sheets, decided, diameter, options)
-        sheets = _run_on(sheets, segments, options.far_reach * diameter)
         sheets = laid_on(sheets, capture.cloud, free, options)
     laid = laid_contacts(sheets, options.min_contact * diameter)
     contacts = (*(to_contact(d, sheets) for d in decided), *laid)
