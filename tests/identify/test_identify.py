@@ -146,3 +146,14 @@ def test_photographed_shelf_is_found_whole():
     parts = shelf_parts()
     assert [round(s.thickness.value, 0) for s in parts.sheets] == [18, 15, 15]
     assert [s.region.area for s in parts.sheets] == pytest.approx([54000, 32000, 32000], rel=0.2)
+
+
+def test_what_boards_do_not_explain_is_told(table):
+    round_thing = ball()
+    points = np.concatenate([table.points, round_thing.points + np.array([0, 0, 400])])
+    both = Cloud(points, np.concatenate([table.normals, round_thing.normals]))
+    assert identify(cloud_only(table)).notes == ()
+    found = identify(cloud_only(both))
+    assert len(found.sheets) >= 3
+    (note,) = found.notes
+    assert f"{100 * (1 - found.selection['explained']):.0f} %" in note and "unexplained" in note

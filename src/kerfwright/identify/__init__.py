@@ -42,4 +42,16 @@ def identify(capture: Capture, options: IdentifyOptions | None = None) -> Parts:
         "candidates": len(slabs), "chosen": len(selection.chosen), "objective": selection.objective,
         "bound": selection.bound, "explained": selection.explained, "method": selection.method,
     }
-    return Parts(sheets, tuple(planes), around.noise, around.spacing, selection=figures)
+    notes = _notes(selection.explained, options.least_explained)
+    return Parts(sheets, tuple(planes), around.noise, around.spacing, notes, figures)
+
+
+def _notes(explained: float, least: float) -> tuple[str, ...]:
+    """What a person should know of a selection that leaves much of the cloud alone."""
+    if explained >= least:
+        return ()
+    left = 100 * (1 - explained)
+    return (
+        f"the boards found leave {left:.0f} % of the cloud's surface unexplained: something of the object is missing, "
+        "or not made of boards: compare model and photographs, and crop what does not belong to it",
+    )

@@ -28,5 +28,6 @@ class IdentifyOptions:
     board_cost: float = 0.006  # a board must explain this share of the surface to be worth having
     free_sites: int = 1500  # interior samples of a candidate tested for see-through
     max_free: float = 0.25  # candidates with a larger share of see-through interior are dropped
+    least_explained: float = 0.7  # share of the surface; stereo's fringe leaves a good model with .8 or more
     solver_seconds: float = 5.0
     seed: int = 0
