@@ -89,15 +89,41 @@ def _joint(members: Members, fitted: Sequence[Fitted], contours: Sequence[Contou
         fit = fit_curves(loops, segments)
     except StageError:
         return None
+    path = _shifted(fit.path, _way_to_planes(fit.path, fitted[first]))
     found = []
     for k, motion in members:
-        own_path = transform_path(fit.path, _inverse(motion))
+        motion = _settled(motion, path, fitted[k])
+        own_path = transform_path(path, _inverse(motion))
         if not _holds(own_path, fitted[k]) or not agree(contour_of(loops), contours[k], motion):
             return None
         mirrored = bool(np.linalg.det(motion[:, :2]) < 0)
         twin = None if k == first else Twin(first, motion, mirrored)
         found.append(replace(fitted[k], path=own_path, notes=fit.notes, twin=twin))
     return found
+
+
+def _shifted(path: CutPath, shift: np.ndarray) -> CutPath:
+    return transform_path(path, np.c_[np.eye(2), shift])
+
+
+def _settled(motion: np.ndarray, path: CutPath, board: Fitted) -> np.ndarray:
+    """The motion with the board's repeat of the path moved onto the planes that the board ends on."""
+    shift = _way_to_planes(transform_path(path, _inverse(motion)), board)
+    return np.c_[motion[:, :2], motion[:, 2] - motion[:, :2] @ shift]
+
+
+def _way_to_planes(path: CutPath, board: Fitted) -> np.ndarray:
+    """(2,) the least shift that puts a path's lines onto the planes of other boards that the board ends on."""
+    rows, gaps = [], []
+    for segment in board.segments:
+        along, inward, length = segment_axes(segment)
+        for line in _lines(path) if segment.origin in HARD else ():
+            x = np.array([line.start, line.end]) - segment.start
+            beside = (x @ along).max() < 0 or (x @ along).min() > length
+            if not beside and np.abs(x @ inward).max() <= ON_SEGMENT:
+                rows.append(inward)
+                gaps.append(-float((x @ inward).mean()))
+    return np.linalg.lstsq(np.array(rows), np.array(gaps), rcond=1e-6)[0] if rows else np.zeros(2)
 
 
 def _inverse(motion: np.ndarray) -> np.ndarray:
@@ -114,7 +140,8 @@ def _mean_loops(members: Members, fitted: Sequence[Fitted], contours: Sequence[C
             distance, _, nearest = contours[k].across(moved_points(_inverse(motion), loop.points))
             own = contours[k].error[nearest] ** -2.0
             weight, shift = weight + own, shift - own * distance
-        out.append(replace(loop, points=loop.points + (shift / weight)[:, None] * normal, standard_error=weight**-0.5))
+        points = loop.points + (shift / weight)[:, None] * normal
+        out.append(replace(loop, points=points, standard_error=weight**-0.5))
     return tuple(out)
 
 
@@ -182,12 +209,15 @@ def _holds(path: CutPath, board: Fitted) -> bool:
     )
 
 
+def _lines(path: CutPath) -> list[Line]:
+    return [e for loop in (path.outer, *path.holes) for e in loop.edges if isinstance(e, Line)]
+
+
 def _length_on(path: CutPath, segment: ConstraintSegment, within: float) -> float:
     """Length of the lines of a path that lie along a segment."""
     along, inward, length = segment_axes(segment)
-    lines = [e for loop in (path.outer, *path.holes) for e in loop.edges if isinstance(e, Line)]
     total = 0.0
-    for line in lines:
+    for line in _lines(path):
         x = np.array([line.start, line.end]) - segment.start
         if np.abs(x @ inward).max() <= within:
             total += max(0.0, min(length, (x @ along).max()) - max(0.0, (x @ along).min()))
