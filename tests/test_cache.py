@@ -17,7 +17,7 @@ from kerfwright.capture.camera import Camera
 from kerfwright.capture.types import Capture, Cloud, View
 from kerfwright.errors import OutputError
 from kerfwright.identify.types import Parts, Primitive, Sheet
-from kerfwright.model import Quantity, Scale
+from kerfwright.model import Origin, Quantity, Scale
 
 
 class Counter:
@@ -87,6 +87,10 @@ def test_results_of_stages_come_back_as_they_were(tmp_path):
     assert back.views[0].camera == camera and back.views[0].path == Path("v.jpg") and back.scale == capture.scale
     assert found.sheets[0].region.equals_exact(hole, 0) and found.sheets[0].thickness == sheet.thickness
     assert (found.primitives[0].point_idx == idx).all() and found.selection == {"gap": 0}
+
+
+def test_provenance_is_pickled_by_value_on_every_python():
+    assert all(origin.__reduce_ex__(5) == (Origin, (origin.value,)) for origin in Origin)
 
 
 @pytest.mark.parametrize("what", [os.system, subprocess.Popen, eval, os.unlink])

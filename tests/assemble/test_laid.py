@@ -76,3 +76,15 @@ def test_faces_that_are_both_seen_stay_apart():
     normals = np.concatenate([cloud.normals, np.tile([0, 0, 1.0], (int(on_rail.sum()), 1))])
     moved = laid_on((whole, seen), Cloud(points, normals), BLIND, OPTIONS)
     assert moved[1].thickness.value == 26 and laid_contacts(moved, 7.0) == []
+
+
+def test_slats_on_two_rails_are_made_flush():
+    """Each slat has its own plane, within what can be measured; no rail could touch them all."""
+    _, cloud = stool(22.0)
+    at = [(410 + 0.1 * k, 110 * k - 150) for k in range(3)]
+    slats = [sheet(f"slat {y}", pose((0, 0, z)), 20, (-200, y, 200, y + 90)) for z, y in at]
+    rails = [sheet(f"rail {x}", pose((x, 0, 380)), 24, (-30, -140, 30, 140)) for x in (-100, 100)]
+    moved = laid_on((*slats, *rails), cloud, BLIND, OPTIONS)
+    assert [s.world_from_board[2, 3] for s in moved[:3]] == pytest.approx([410.1] * 3)
+    assert [s.thickness.value for s in moved[3:]] == pytest.approx([30.1] * 2)
+    assert len(laid_contacts(moved, 7.0)) == 6

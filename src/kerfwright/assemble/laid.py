@@ -39,18 +39,59 @@ class _Pair:
     overlap: Polygon | MultiPolygon
 
 
+@dataclass(frozen=True)
+class _Link:
+    """A hidden face, as (board, face), that is put on the plane of another."""
+
+    hidden: tuple[int, str]
+    other: tuple[int, str]
+
+
 def laid_on(
     sheets: tuple[Sheet, ...], cloud: Cloud, free: FreeSpace, options: AssembleOptions
 ) -> tuple[Sheet, ...]:
-    """The sheets with hidden faces moved onto the faces that hide them, nearest pairs first."""
+    """The sheets with hidden faces moved onto the faces that hide them; what hides them together is made flush."""
+    links = []
+    for pair in _pairs(sheets, options.min_contact * cloud.diameter):
+        link = _link(pair, sheets, cloud, options)
+        if link is not None and not _is_free(pair, sheets, free):
+            links.append(link)
+    for group in _groups(links):
+        sheets = _on_one_plane(sheets, group, options.flush * cloud.diameter)
+    return sheets
+
+
+def _groups(links: list[_Link]) -> list[list[_Link]]:
+    """Links that share a face, directly or through others: all their faces lie on one plane."""
+    groups: list[list[_Link]] = []
+    for link in links:
+        near = [g for g in groups if any({link.hidden, link.other} & {other.hidden, other.other} for other in g)]
+        groups = [g for g in groups if g not in near] + [[*(one for g in near for one in g), link]]
+    return groups
+
+
+def _on_one_plane(sheets: tuple[Sheet, ...], group: list[_Link], furthest: float) -> tuple[Sheet, ...]:
+    """Boards that hold the plane are moved to their mean, by no more than `furthest` mm; then hidden faces onto it."""
+    hidden = {link.hidden for link in group}
+    holding = sorted({link.other for link in group} - hidden) or sorted(hidden)
+    normal = face_plane(sheets[holding[0][0]], holding[0][1])[0]
+    offsets = [_offset(sheets[k], face, normal) for k, face in holding]
+    level = float(np.average(offsets, weights=[sheets[k].region.area for k, _ in holding]))
     moved = list(sheets)
-    for pair in sorted(_pairs(sheets, options.min_contact * cloud.diameter), key=lambda p: abs(p.gap)):
-        mover = _mover(pair, moved, cloud, options)
-        if mover is None or _is_free(pair, moved, free):
-            continue
-        one, face, other, other_face = mover
-        moved[one] = _reached(moved[one], face, *face_plane(moved[other], other_face))
+    for (k, face), offset in zip(holding, offsets, strict=True):
+        if (k, face) not in hidden and abs(level - offset) <= furthest:
+            frame = moved[k].world_from_board.copy()
+            frame[:3, 3] += (level - offset) * normal
+            moved[k] = replace(moved[k], world_from_board=frame)
+    for k, face in sorted(hidden):
+        moved[k] = _reached(moved[k], face, normal, level)
     return tuple(moved)
+
+
+def _offset(sheet: Sheet, face: str, normal: np.ndarray) -> float:
+    """Of a face's plane along a normal that is its own or the opposite one."""
+    own, offset = face_plane(sheet, face)
+    return offset if own @ normal > 0 else -offset
 
 
 def laid_contacts(sheets: tuple[Sheet, ...], shortest: float) -> list[Contact]:
@@ -93,16 +134,15 @@ def _moved_region(sheet: Sheet, to: Sheet) -> Polygon:
     return Polygon(ring(sheet.region.exterior.coords), [ring(r.coords) for r in sheet.region.interiors]).buffer(0)
 
 
-def _mover(
-    pair: _Pair, sheets: list[Sheet], cloud: Cloud, options: AssembleOptions
-) -> tuple[int, str, int, str] | None:
-    """Which board's face is moved onto which other's: the one nobody sees; None where both are seen apart."""
-    ways = ((pair.a, pair.face_a, pair.b, pair.face_b), (pair.b, pair.face_b, pair.a, pair.face_a))
-    seen = [_seen(sheets[one], face, pair, sheets[pair.a], cloud, options) for one, face, _, _ in ways]
+def _link(pair: _Pair, sheets: tuple[Sheet, ...], cloud: Cloud, options: AssembleOptions) -> _Link | None:
+    """Which board's face is put where the other's is: the one nobody sees; None where both are seen apart."""
+    faces = ((pair.a, pair.face_a), (pair.b, pair.face_b))
+    seen = [_seen(sheets[k], face, pair, sheets[pair.a], cloud, options) for k, face in faces]
     if min(seen) > SEEN:
         return None
-    areas = [sheets[one].region.area for one, _, _, _ in ways]
-    return ways[0 if (seen[0] > SEEN, areas[0]) < (seen[1] > SEEN, areas[1]) else 1]
+    areas = [sheets[k].region.area for k, _ in faces]
+    first = (seen[0] > SEEN, areas[0]) < (seen[1] > SEEN, areas[1])
+    return _Link(*(faces if first else faces[::-1]))
 
 
 def _seen(sheet: Sheet, face: str, pair: _Pair, frame: Sheet, cloud: Cloud, options: AssembleOptions) -> float:
@@ -118,7 +158,7 @@ def _seen(sheet: Sheet, face: str, pair: _Pair, frame: Sheet, cloud: Cloud, opti
     return float(min(cells * cell**2 / inner.area, 1.0))
 
 
-def _is_free(pair: _Pair, sheets: list[Sheet], free: FreeSpace) -> bool:
+def _is_free(pair: _Pair, sheets: tuple[Sheet, ...], free: FreeSpace) -> bool:
     """Whether cameras saw through the gap between the faces."""
     frame = sheets[pair.a]
     level = frame.thickness.value + pair.gap / 2 if pair.face_a == "top" else -pair.gap / 2

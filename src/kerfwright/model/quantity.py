@@ -25,6 +25,10 @@ class Origin(StrEnum):
     INFERRED = "inferred"  # nothing showed it; chosen so that the assembly holds
     GIVEN = "given"  # the user said so
 
+    def __reduce_ex__(self, protocol: int) -> tuple[type[Origin], tuple[str]]:
+        """Pickled by its value on every Python: 3.11.0 to 3.11.3 call `getattr`, which the cache rightly refuses."""
+        return type(self), (self.value,)
+
 
 class Quantity(Frozen):
     """A length in millimetres or an angle in degrees, with its standard error and origin."""

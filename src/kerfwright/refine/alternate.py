@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+import shapely
+
 from kerfwright.assemble import AssembleOptions, assemble
 from kerfwright.assemble.apart import kept_apart
 from kerfwright.assemble.outlines import constrained_region
@@ -47,10 +50,22 @@ def traced_pieces(
     for sheet, segments, board in zip(assembly.sheets, assembly.constraints, found, strict=True):
         for outline in board.outlines:
             region = constrained_region(outline_region(outline), segments, diameter / 6, diameter / 20)
-            pieces.append(Piece(replace(sheet, region=region), outline))
+            own = replace(sheet, region=region)
+            pieces.append(Piece(_with_own_points(own, capture) if len(board.outlines) > 1 else own, outline))
     if options.use_images:
         pieces = _split(pieces, assembly, capture)
     return tuple(replace(p, sheet=replace(p.sheet, name=f"board_{k + 1:02d}")) for k, p in enumerate(pieces))
+
+
+def _with_own_points(piece: Sheet, capture: Capture) -> Sheet:
+    """One of several pieces of a board, with the points that lie on it or at its edge."""
+    around = piece.region.buffer(capture.cloud.diameter / 200)
+
+    def own(idx: np.ndarray) -> np.ndarray:
+        xy = piece.to_board(capture.cloud.points[idx])[:, :2]
+        return idx[shapely.contains_xy(around, xy[:, 0], xy[:, 1])]
+
+    return replace(piece, top_idx=own(piece.top_idx), bottom_idx=own(piece.bottom_idx), cut_idx=own(piece.cut_idx))
 
 
 def assembled_again(
