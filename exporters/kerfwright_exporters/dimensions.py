@@ -62,12 +62,15 @@ def sheet_dimensions(sheet: Sheet, scale: float, options: ExportOptions) -> Iter
 
 
 def _polygon(board: LaidBoard) -> Polygon:
+    """The board's outline as laid; where sampled arcs cross a neighbour by less than their tolerance, made valid."""
+    import shapely
     from shapely.geometry import Polygon
 
     rings = {cut.operation: [] for cut in board.drawing.cuts}
     for cut in board.drawing.cuts:
         rings[cut.operation].append(sample_loop(cut.loop, 0.1))
-    return Polygon(rings["outside"][0], rings.get("inside", []))
+    parts = shapely.get_parts(shapely.make_valid(Polygon(rings["outside"][0], rings.get("inside", []))))
+    return max((part for part in parts if part.geom_type == "Polygon"), key=shapely.area)
 
 
 def _on_board(polygon: Polygon, across: int, height: float, options: ExportOptions) -> Iterator[Dimension]:

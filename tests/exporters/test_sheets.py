@@ -4,6 +4,7 @@ import json
 import math
 from dataclasses import replace
 from itertools import combinations
+from types import SimpleNamespace
 
 import ezdxf
 import numpy as np
@@ -165,3 +166,13 @@ def test_dimensions_are_in_all_three_drawings(tmp_path):
 def test_same_bytes_twice(tmp_path):
     first, second = (export(stool(), tmp_path / folder, ExportOptions()) for folder in "ab")
     assert [p.read_bytes() for p in first] == [p.read_bytes() for p in second]
+
+
+def test_an_outline_that_crosses_itself_by_a_hair_is_measured_all_the_same():
+    from kerfwright_exporters.dimensions import _polygon
+
+    hair = [(0, 0), (50, 0), (50.02, -0.01), (50.01, 0.02), (49.99, -0.02), (100, 0), (100, 60), (0, 60)]
+    cut = SimpleNamespace(operation="outside", loop=polygon(hair))
+    assert not shapely.Polygon(hair).is_valid
+    whole = _polygon(SimpleNamespace(drawing=SimpleNamespace(cuts=[cut])))
+    assert whole.is_valid and whole.area == pytest.approx(6000, rel=1e-3)
