@@ -1,4 +1,4 @@
-.PHONY: accuracy demo lint speed test
+.PHONY: accuracy demo fuzz kill lint properties speed test
 
 PYTHON = .venv/bin/python
 # Folders of captures with truth that the accuracy board runs over.
@@ -12,6 +12,16 @@ accuracy: .venv/installed
 
 speed: .venv/installed
 	$(PYTHON) benchmarks/speed.py fixtures/stool --out board-out
+
+fuzz: .venv/installed
+	$(PYTHON) -m pip install --quiet --disable-pip-version-check '.[clouds]'
+	$(PYTHON) benchmarks/fuzz.py --out board-out
+
+kill: .venv/installed
+	$(PYTHON) benchmarks/kill.py fixtures/stool --out board-out
+
+properties: .venv/installed
+	$(PYTHON) benchmarks/properties.py fixtures/stool --out board-out
 
 lint: .venv/installed
 	$(PYTHON) -m pip install --quiet --disable-pip-version-check '.[dev]'

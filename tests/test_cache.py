@@ -1,6 +1,7 @@
 """Stages that ran once are not run again, unless anything they depend on has changed."""
 
 import errno
+import hashlib
 import os
 import pickle
 import subprocess
@@ -12,7 +13,7 @@ import pytest
 from shapely.geometry import Polygon
 
 from kerfwright import cache as cache_module
-from kerfwright.cache import StageCache, folder_hash, program_hash
+from kerfwright.cache import StageCache, folder_hash, program_hash, read_kept
 from kerfwright.capture.camera import Camera
 from kerfwright.capture.types import Capture, Cloud, View
 from kerfwright.errors import OutputError
@@ -151,3 +152,11 @@ def test_the_program_s_hash_is_the_same_in_every_process():
     script = "from kerfwright.cache import program_hash; print(program_hash())"
     other = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env={"PYTHONHASHSEED": "7"})
     assert other.stdout.strip() == program_hash()
+
+
+@pytest.mark.parametrize("data", [b"", b"\x00", b"\x80\x05\x95", b"\x80\x05Q.", pickle.dumps([1])[:-1]])
+def test_a_kept_result_that_is_no_pickle_is_told(tmp_path, data):
+    """With the right hash, as somebody may make it: unpickling raises whatever it likes."""
+    (tmp_path / "capture-0").write_bytes(hashlib.sha256(data).digest() + data)
+    with pytest.raises(OutputError, match=r"cache: \w+: not what kerfwright keeps there"):
+        read_kept(tmp_path, "capture")

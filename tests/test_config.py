@@ -52,3 +52,11 @@ def test_where_it_is_looked_for(monkeypatch, tmp_path):
     monkeypatch.delenv("XDG_CONFIG_HOME")
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     assert config_path() == tmp_path / "home" / ".config" / "kerfwright" / "config.toml"
+
+
+@pytest.mark.parametrize("text", ["a = " + "[" * 20_000, f"[{'x' * 9000}]", f'[reconstruct]\nup = ["{"y" * 9000}"]'])
+def test_what_is_told_is_one_short_line(tmp_path, text):
+    (tmp_path / "config.toml").write_text(text)
+    with pytest.raises(OptionError) as caught:
+        read_config(tmp_path / "config.toml")
+    assert "\n" not in str(caught.value) and len(str(caught.value)) < 400

@@ -180,3 +180,11 @@ def test_the_manifest_is_the_same_from_run_to_run(tmp_path):
     for name, seconds in (("one", "1"), ("two", "2")):
         write(tmp_path / name, model_json="m", run_json=seconds)
     assert (tmp_path / "one/.kerfwright.json").read_bytes() == (tmp_path / "two/.kerfwright.json").read_bytes()
+
+
+def test_a_manifest_nested_without_end_is_told(tmp_path):
+    write(tmp_path / "out", a_txt="1")
+    (tmp_path / "out" / ".kerfwright.json").write_text("[" * 20_000)
+    folder = OutputFolder(tmp_path / "out")
+    with pytest.raises(OutputError, match="manifest: not as kerfwright writes it"), folder.claimed():
+        pass

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from kerfwright.errors import CaptureError, OutputError
+from kerfwright.errors import CaptureError, OutputError, shown
 from kerfwright.versions import library_versions
 
 __all__ = ["NO_CACHE", "StageCache", "folder_hash", "program_hash", "read_kept"]
@@ -108,7 +108,14 @@ def _read(path: Path) -> tuple[Any] | None:
     digest, body = data[:_DIGEST_BYTES], data[_DIGEST_BYTES:]
     if hashlib.sha256(body).digest() != digest:
         return None
-    return (_Unpickler(io.BytesIO(body)).load(),)
+    try:
+        return (_Unpickler(io.BytesIO(body)).load(),)
+    except OutputError:
+        raise
+    except Exception as error:  # a pickle that somebody made can raise anything
+        raise OutputError(
+            f"{path}: cache: {shown(type(error).__name__)}: not what kerfwright keeps there: delete the folder's .cache"
+        ) from error
 
 
 class _Unpickler(pickle.Unpickler):

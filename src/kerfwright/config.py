@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from kerfwright.errors import OptionError
+from kerfwright.errors import OptionError, shown
 
 __all__ = ["CONFIGURABLE", "config_path", "default_config", "read_config"]
 
@@ -60,8 +60,8 @@ def read_config(path: Path) -> dict[str, dict[str, Any]]:
         tables = tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return {}
-    except (OSError, ValueError) as error:
-        raise OptionError(f"{path}: {error}: mend it, or delete it and run `kerfwright config`") from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise OptionError(f"{path}: {shown(str(error))}: mend it, or delete it and run `kerfwright config`") from error
     for command, options in tables.items():
         _check_table(path, command, options)
     return tables
@@ -70,10 +70,11 @@ def read_config(path: Path) -> dict[str, dict[str, Any]]:
 def _check_table(path: Path, command: str, options: Any) -> None:
     known = _OPTIONS.get(command)
     if known is None or not isinstance(options, Mapping):
-        raise OptionError(f"{path}: [{command}]: not a table of options: use {', '.join(f'[{c}]' for c in _OPTIONS)}")
+        known_tables = ", ".join(f"[{c}]" for c in _OPTIONS)
+        raise OptionError(f"{path}: [{shown(command)}]: not a table of options: use {known_tables}")
     for name, value in options.items():
         if name not in known:
-            raise OptionError(f"{path}: {command}.{name}: no such option: use one of {', '.join(known)}")
+            raise OptionError(f"{path}: {command}.{shown(name)}: no such option: use one of {', '.join(known)}")
         kinds = known[name][0]
         if not isinstance(value, kinds) or (isinstance(value, bool) and kinds is not bool):
-            raise OptionError(f"{path}: {command}.{name}: {value!r}: wrong kind of value: {known[name][2]}")
+            raise OptionError(f"{path}: {command}.{name}: {shown(value)}: wrong kind of value: {known[name][2]}")

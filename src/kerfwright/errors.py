@@ -4,7 +4,18 @@ Every error names the file or option, the field, the value found and the remedy.
 each of them into one line and exit code 2.
 """
 
-__all__ = ["CaptureError", "ExportError", "KerfwrightError", "ModelError", "OptionError", "OutputError", "StageError"]
+__all__ = [
+    "CaptureError", "ExportError", "KerfwrightError", "ModelError", "OptionError", "OutputError", "StageError", "shown",
+]  # fmt: skip
+
+
+SHOWN_LENGTH = 60
+
+
+def shown(found: object) -> str:
+    """A value as an error shows it: one line, printable, not too long."""
+    text = ascii(found) if not isinstance(found, str) or not found.isprintable() else found
+    return text if len(text) <= SHOWN_LENGTH else text[: SHOWN_LENGTH - 3] + "..."
 
 
 class KerfwrightError(Exception):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from fractions import Fraction
 
-from kerfwright.errors import OptionError
+from kerfwright.errors import OptionError, shown
 
 __all__ = ["length", "size"]
 
@@ -30,7 +30,7 @@ def length(option: str, text: str) -> float:
         value = -1.0
     value *= 25.4 if found and found[3] in ("in", '"') else 1.0
     if not 0 <= value <= _LONGEST:
-        raise OptionError(f"{option}: {text!r}: not a length: write millimetres, as 6, or inches, as 1/4in")
+        raise OptionError(f"{option}: {shown(text)!r}: not a length: write millimetres, as 6, or inches, as 1/4in")
     return value
 
 
@@ -44,6 +44,6 @@ def size(option: str, text: str) -> tuple[float, float]:
     """
     found = _SIZE.fullmatch(text.strip())
     if not found:
-        raise OptionError(f"{option}: {text!r}: not a size: write length x width, as 2440x1220 or 96x48in")
+        raise OptionError(f"{option}: {shown(text)!r}: not a size: write length x width, as 2440x1220 or 96x48in")
     unit = found[4] or found[2] or ""
     return length(option, found[1] + (found[2] or unit)), length(option, found[3] + unit)

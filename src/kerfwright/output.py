@@ -208,7 +208,7 @@ def _read_manifest(path: Path) -> dict[str, str | None]:
     try:
         files = json.loads(path.read_text(encoding="utf-8"))["files"]
         sound = all(_is_inside(name) and (mark is None or isinstance(mark, str)) for name, mark in files.items())
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         sound = False
     if not sound:
         raise OutputError(f"{path}: manifest: not as kerfwright writes it: delete the folder or choose another one")

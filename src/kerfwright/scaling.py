@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kerfwright.errors import OptionError
+from kerfwright.errors import OptionError, shown
 from kerfwright.model import Board, Finding, Model, Scale
 from kerfwright.model.frames import rows
 from kerfwright.model.geometry import sample_loop
@@ -68,8 +68,8 @@ def _parsed(text: str) -> Length:
     value = float(found[3]) * UNITS[found[4] or "mm"] if found else 0.0
     if not 0 < value < 1e6:
         raise OptionError(
-            f"--length: {text}: give BOARD:AXIS=LENGTH, such as top:x=420mm; AXIS is x, y or z, BOARD a name from the "
-            f"report, {TOP} (the highest level board) or {WHOLE}"
+            f"--length: {shown(text)}: give BOARD:AXIS=LENGTH, such as top:x=420mm; AXIS is x, y or z, BOARD a name "
+            f"from the report, {TOP} (the highest level board) or {WHOLE}"
         )
     return Length(found[1], found[2], value)
 

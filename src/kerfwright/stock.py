@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from kerfwright.errors import OptionError
+from kerfwright.errors import OptionError, shown
 from kerfwright.lengths import length
 from kerfwright.model import Board, Finding, Origin, Scale
 
@@ -74,7 +74,8 @@ def _parsed(item: str) -> tuple[StockSize, ...]:
         value = 0.0
     if not 0 < value <= LARGEST:
         raise OptionError(
-            f"--stock: {item!r}: neither a table nor a thickness: give metric, inch, or thicknesses as 12,18,1/2in"
+            f"--stock: {shown(item)!r}: neither a table nor a thickness: give metric, inch, or thicknesses "
+            "as 12,18,1/2in"
         )
     label = item if item[-1] in 'mn"' else f"{item} mm"
     return (StockSize(label, value),)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,33 +9,8 @@ import cv2
 import numpy as np
 import pytest
 
-from kerfwright.capture import Camera, Cloud, View, write_colmap_text, write_ply
-
-MODEL_IDS = {
-    "SIMPLE_PINHOLE": 0, "PINHOLE": 1, "SIMPLE_RADIAL": 2, "RADIAL": 3, "OPENCV": 4, "OPENCV_FISHEYE": 5,
-    "FULL_OPENCV": 6, "SIMPLE_RADIAL_FISHEYE": 8, "RADIAL_FISHEYE": 9,
-}
-
-
-def look_at(centre: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """camera_from_world of a camera at `centre` that sees `target` in mid-image, world z upwards."""
-    forward = (target - centre) / np.linalg.norm(target - centre)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    pose = np.eye(4)
-    pose[:3, :3] = np.stack([right, np.cross(forward, right), forward])
-    pose[:3, 3] = -pose[:3, :3] @ centre
-    return pose
-
-
-def ring_of_views(
-    count: int, radius: float, height: float, target: np.ndarray, folder: Path, size=(64, 48)
-) -> list[View]:
-    """Views from all sides; the files of their images need not exist."""
-    camera = Camera("PINHOLE", *size, (0.9 * size[0], 0.9 * size[0], size[0] / 2, size[1] / 2))
-    angles = 2 * np.pi * np.arange(count) / count
-    centres = np.stack([radius * np.cos(angles), radius * np.sin(angles), np.full(count, height)], axis=1) + target
-    return [View(f"{i}.png", folder / "images" / f"{i}.png", camera, look_at(c, target)) for i, c in enumerate(centres)]
+from kerfwright.capture import Cloud, View, write_colmap_text, write_ply
+from samples import colmap_binary, look_at, ring_of_views
 
 
 def box_cloud(low, high, spacing: float, generator: np.random.Generator, noise: float = 0.0) -> Cloud:
@@ -105,35 +79,6 @@ def capture_folder(tmp_path: Path, generator: np.random.Generator) -> Path:
     write_colmap_text(folder / "sparse" / "0", views)
     write_ply(folder / "cloud.ply", stool_cloud(generator))
     return folder
-
-
-def colmap_binary(folder: Path, views: list[View]) -> None:
-    """cameras.bin and images.bin as https://colmap.github.io/format.html has them; two 2-D points a view."""
-    folder.mkdir(parents=True, exist_ok=True)
-    cameras, images = [struct.pack("<Q", len(views))], [struct.pack("<Q", len(views))]
-    for i, view in enumerate(views, 1):
-        camera = view.camera
-        cameras.append(struct.pack("<IiQQ", i, MODEL_IDS[camera.model], camera.width, camera.height))
-        cameras.append(struct.pack(f"<{len(camera.params)}d", *camera.params))
-        pose = view.camera_from_world
-        images.append(struct.pack("<I7dI", i, *quaternion(pose[:3, :3]), *pose[:3, 3], i) + view.name.encode() + b"\0")
-        images.append(struct.pack("<Q", 2) + struct.pack("<ddq", 1.5, 2.5, -1) * 2)
-    (folder / "cameras.bin").write_bytes(b"".join(cameras))
-    (folder / "images.bin").write_bytes(b"".join(images))
-
-
-def quaternion(turn: np.ndarray) -> np.ndarray:
-    """(w, x, y, z): the eigenvector of Bar-Itzhack's matrix with the largest eigenvalue."""
-    (a, b, c), (d, e, f), (g, h, i) = turn
-    k = np.array(
-        [
-            [a + e + i, h - f, c - g, d - b],
-            [h - f, a - e - i, b + d, c + g],
-            [c - g, b + d, e - a - i, f + h],
-            [d - b, c + g, f + h, i - a - e],
-        ]
-    )
-    return np.linalg.eigh(k)[1][:, -1]
 
 
 @pytest.fixture(scope="session")

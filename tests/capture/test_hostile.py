@@ -4,50 +4,15 @@ from __future__ import annotations
 
 import warnings
 
-import cv2
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import exports
-from kerfwright.capture import Cloud, open_capture, write_colmap_text, write_ply
-from kerfwright.capture.alicevision import read_alicevision
-from kerfwright.capture.bundler import read_bundler
-from kerfwright.capture.colmap import read_colmap
-from kerfwright.capture.images import image_size
-from kerfwright.capture.metashape import read_metashape
-from kerfwright.capture.nerfstudio import read_nerfstudio
-from kerfwright.capture.openmvg import read_openmvg
+from kerfwright.capture import open_capture
 from kerfwright.capture.ply import read_ply
-from kerfwright.capture.readers import read_cloud
-from kerfwright.capture.realitycapture import read_rc_csv, read_rc_xmp
 from kerfwright.errors import CaptureError
+from samples import SNIPPETS, readers, write_samples
 
-SNIPPETS = [
-    b"",
-    b"\0",
-    b"\xff",
-    b"\n",
-    b"\r\n",
-    b" ",
-    b"-",
-    b"nan",
-    b"inf",
-    b"1e999",
-    b"1,5",
-    b"999999999999",
-    b"-1",
-    b"#",
-    b"\xff\xfe",
-    b"\x00\x00\x00\x80",
-    b"\xff\xff\xff\xff\xff\xff\xff\x7f",
-    "é".encode(),
-    b"../",
-    b"list uchar int ",
-    b"end_header\n",
-    b"element vertex 7\n",
-]
 MUTATIONS = st.lists(
     st.tuples(st.floats(0, 1), st.floats(0, 0.1), st.sampled_from(SNIPPETS) | st.binary(max_size=9)),
     min_size=1,
@@ -63,98 +28,12 @@ def mutated(data: bytes, mutations) -> bytes:
     return data
 
 
-def ply_bytes(encoding: str) -> bytes:
-    header = (
-        "ply\nformat {} 1.0\nelement edge 2\nproperty list uchar short n\nelement vertex 4\nproperty float x\n"
-        "property float y\nproperty double z\nproperty list uchar int views\nproperty uchar red\nend_header\n"
-    )
-    if encoding == "ascii":
-        return header.format(encoding).encode() + b"1 5\n0\n" + b"0.5 1 -2e3 2 7 8 255\n1 2 3 0 9\n" * 2
-    order = "<" if "little" in encoding else ">"
-    row = np.array(
-        [(0.5, 1, -2e3, 1, 7, 255)],
-        [("x", order + "f4"), ("y", order + "f4"), ("z", order + "f8"), ("n", "u1"), ("v", order + "i4"), ("r", "u1")],
-    )
-    return header.format(encoding).encode() + b"\1\0\5\0" + row.tobytes() * 4
-
-
 @pytest.fixture(scope="module")
-def good(tmp_path_factory, shapes, write_binary):
+def good(tmp_path_factory):
     """Whole files, by name."""
     folder = tmp_path_factory.mktemp("good")
-    views = shapes["ring"](2, 1.0, 0.5, np.zeros(3), folder, (20, 10))
-    write_colmap_text(folder, views)
-    write_binary(folder, views)
-    picture = np.random.default_rng(0).integers(0, 255, (10, 20, 3), np.uint8)
-    for name in ("a.jpg", "a.png", "a.tif"):
-        cv2.imwrite(str(folder / name), picture)
-    write_ply(folder / "simple.ply", Cloud(np.eye(3), np.eye(3), np.zeros((3, 3), np.uint8)))
-    (folder / "bundle.out").write_text(
-        "# Bundle file v0.3\n2 0\n" + "50 0.1 -0.2\n1 0 0\n0 1 0\n0 0 1\n0.1 0.2 0.3\n" * 2
-    )
-    (folder / "list.txt").write_text("a.png 0 55.5\na.jpg\n")
-    for encoding in ("ascii", "binary_little_endian", "binary_big_endian"):
-        (folder / f"{encoding}.ply").write_bytes(ply_bytes(encoding))
-    other_programs(folder)
-    other_clouds(folder)
+    write_samples(folder)
     return folder
-
-
-def other_programs(folder):
-    """cameras.csv, cameras.xml, cameras.sfm, transforms.json, sfm_data.json, and an XMP file."""
-    exports.images(folder)
-    for writer in (
-        exports.rc_csv, exports.rc_xmp, exports.metashape, exports.meshroom, exports.nerfstudio, exports.openmvg,
-    ):
-        writer(folder, exports.scene())
-    (folder / "images" / "x.xmp").rename(folder / "a.xmp")
-
-
-def other_clouds(folder):
-    import laspy
-    import open3d as o3d
-    import pye57
-
-    points = np.random.default_rng(2).uniform(size=(40, 3))
-    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
-    o3d.io.write_point_cloud(str(folder / "ascii.pcd"), cloud, write_ascii=True)
-    o3d.io.write_point_cloud(str(folder / "binary.pcd"), cloud)
-    o3d.io.write_point_cloud(str(folder / "compressed.pcd"), cloud, compressed=True)
-    (folder / "a.xyz").write_text("\n".join(" ".join(f"{v:.5f}" for v in [*p, 1, 0, -1, 9, 8, 7]) for p in points))
-    las = laspy.LasData(laspy.LasHeader(point_format=2, version="1.2"))
-    las.x, las.y, las.z = points.T
-    las.write(str(folder / "a.las"))
-    las.write(str(folder / "a.laz"))
-    file = pye57.E57(str(folder / "a.e57"), mode="w")
-    file.write_scan_raw({f"cartesian{axis}": points[:, k].copy() for k, axis in enumerate("XYZ")})
-    file.close()
-
-
-def readers(folder):
-    """What reads each file."""
-
-    def picture(name):
-        return folder / "a.png"
-
-    return {
-        ".ply": lambda name: read_ply(folder / name),
-        ".bin": lambda name: read_colmap(folder),
-        ".txt": lambda name: (
-            read_bundler(folder / "bundle.out", lambda image: folder / "a.png")
-            if name == "list.txt"
-            else read_colmap(folder)
-        ),
-        ".out": lambda name: read_bundler(folder / name, lambda image: folder / "a.png"),
-        ".jpg": lambda name: image_size(folder / name),
-        ".png": lambda name: image_size(folder / name),
-        ".tif": lambda name: image_size(folder / name),
-        ".csv": lambda name: read_rc_csv(folder / name, picture),
-        ".xmp": lambda name: read_rc_xmp([folder / name], picture),
-        ".xml": lambda name: read_metashape(folder / name, picture),
-        ".sfm": lambda name: read_alicevision(folder / name, picture),
-        ".json": lambda name: (read_openmvg if name == "sfm_data.json" else read_nerfstudio)(folder / name, picture),
-        **dict.fromkeys((".pcd", ".xyz", ".las", ".laz", ".e57"), lambda name: read_cloud(folder / name)),
-    }
 
 
 FILES = [
@@ -211,6 +90,50 @@ def test_only_our_own_errors(good, tmp_path, name, mutations):
         read_only(good, tmp_path, name, mutated((good / name).read_bytes(), mutations))
     except CaptureError as error:
         assert "\n" not in str(error) and len(str(error)) < 600
+
+
+# What fuzzing found (benchmarks/fuzz.py), at its smallest: file, bytes in it, other bytes, what is told or None.
+FOUND = [
+    ("ascii.ply", b"2 7 8 255", b"9" * 30 + b" 7 8 255", None),  # took years
+    ("binary_little_endian.ply", b"element vertex 4", b"element vertex 0", None),  # IndexError
+    ("ascii.pcd", b"COUNT 1 1 1", b"COUNT 0 1 1", "FIELDS"),  # KeyError
+    ("binary.pcd", b"COUNT 1 1 1", b"COUNT 0 1 1", "FIELDS"),  # ValueError
+    ("cameras.xml", b"<transform>", b"<transform>1e308 ", "numbers belong here"),
+]
+
+
+@pytest.mark.parametrize(("name", "old", "new", "told"), FOUND)
+def test_what_fuzzing_found(good, tmp_path, name, old, new, told):
+    data = (good / name).read_bytes()
+    assert old in data
+    if told is None:
+        read_only(good, tmp_path, name, data.replace(old, new, 1))
+        return
+    with pytest.raises(CaptureError, match=told):
+        read_only(good, tmp_path, name, data.replace(old, new, 1))
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_text_cloud_without_a_line_is_told_without_a_warning(tmp_path):
+    header = "ply\nformat ascii 1.0\nelement vertex 4\n" + "".join(f"property float {a}\n" for a in "xyz")
+    (tmp_path / "a.ply").write_text(f"{header}end_header\n" + "\n" * 60)
+    with pytest.raises(CaptureError, match="0 rows of 4"):
+        read_ply(tmp_path / "a.ply")
+
+
+def test_signalling_nan_in_binary_clouds_does_not_warn(good, tmp_path):
+    data = (good / "binary.pcd").read_bytes()
+    start = data.index(b"DATA binary\n") + len(b"DATA binary\n")
+    read_only(good, tmp_path, "binary.pcd", data[:start] + b"\x01\x00\xa0\x7f" + data[start + 4 :])
+
+
+@pytest.mark.parametrize("record", [bytes([165, 130]), bytes([19, 170]), bytes([218, 158])])
+def test_damages_at_which_lazrs_aborts_leave_this_process_alone(good, tmp_path, record):
+    """In the item record of the LAZ header: the library asks for more memory than there is, and ends its process."""
+    data = bytearray((good / "a.laz").read_bytes())
+    data[295:297] = record
+    with pytest.raises(CaptureError, match=r"a\.laz: file: .*: it is damaged"):
+        read_only(good, tmp_path, "a.laz", bytes(data))
 
 
 @pytest.mark.parametrize("name", ["../../outside.png", "..\\..\\outside.png"])

@@ -22,6 +22,7 @@ from kerfwright.model import (
 )
 from kerfwright.model.frames import board_from_model, model_from_board, rows
 from kerfwright.model.io import model_to_json
+from simple import stool
 
 
 def rectangle(width: float, height: float) -> Loop:
@@ -188,3 +189,28 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
         write_model(model(), path)
     assert path.is_dir() and stat.S_ISDIR(path.stat().st_mode)
     assert [p.name for p in tmp_path.iterdir()] == ["model.json"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('"name": "top"', f'"name": "{"<" * 9000}"'), ('"stock"', f'"{"(" * 9000}"'),
+        ('"kind": "line"', f'"kind": "{"x" * 9000}"'),
+    ],
+)  # fmt: skip
+def test_long_names_are_told_shortly(tmp_path, old, new):
+    path = tmp_path / "model.json"
+    text = model_to_json(stool())
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(ModelError) as caught:
+        read_model(path)
+    assert len(str(caught.value)) < 600
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_pose_of_absurd_numbers_is_told_without_a_warning(tmp_path):
+    path = tmp_path / "model.json"
+    path.write_text(model_to_json(stool()).replace("[[1.0,", "[[1e308,", 1))
+    with pytest.raises(ModelError, match="stretches or shears"):
+        read_model(path)

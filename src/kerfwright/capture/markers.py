@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kerfwright.capture.types import View
-from kerfwright.errors import CaptureError, OptionError
+from kerfwright.errors import CaptureError, OptionError, shown
 from kerfwright.model import Scale
 
 __all__ = ["Markers", "marker_scale", "parse_markers"]
@@ -52,7 +52,7 @@ def parse_markers(text: str) -> Markers:
         side = 0.0
     if not found or not 0 < side < 1e5 or found[1].lower() not in FAMILIES:
         known = ", ".join(FAMILIES)
-        raise OptionError(f"--markers: {text}: give FAMILY:SIDE, such as 4x4_50:40mm; families are {known}")
+        raise OptionError(f"--markers: {shown(text)}: give FAMILY:SIDE, such as 4x4_50:40mm; families are {known}")
     return Markers(found[1].lower(), side)
 
 

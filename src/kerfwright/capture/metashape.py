@@ -39,6 +39,7 @@ def _is_agisoft(path: Path) -> bool:
     return b"<document" in start and b"<chunk" in start
 
 
+@np.errstate(over="ignore", invalid="ignore")  # numbers too large to be true fail the checks
 def read_metashape(path: Path, locate: Locate) -> list[PosedImage]:
     """Images with a transform, in the order of the file; others were not aligned.
 

@@ -5,17 +5,9 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from kerfwright.errors import CaptureError
+from kerfwright.errors import CaptureError, shown
 
 __all__ = ["capture_error", "finite_float", "read_bytes", "read_lines", "shown", "whole_number"]
-
-SHOWN_LENGTH = 60
-
-
-def shown(found: object) -> str:
-    """A value as an error shows it: one line, printable, not too long."""
-    text = ascii(found) if not isinstance(found, str) or not found.isprintable() else found
-    return text if len(text) <= SHOWN_LENGTH else text[: SHOWN_LENGTH - 3] + "..."
 
 
 def capture_error(path: Path | str, field: str, found: object, remedy: str) -> CaptureError:

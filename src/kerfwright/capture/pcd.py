@@ -29,6 +29,7 @@ class _Header:
     size: int  # bytes
 
 
+@np.errstate(invalid="ignore", over="ignore")  # at NaN of the signalling kind
 def read_pcd(path: Path) -> RawCloud:
     """Read the points as they are: values are not judged, NaN included.
 
@@ -40,7 +41,7 @@ def read_pcd(path: Path) -> RawCloud:
     data = read_bytes(path)
     header = _header(data, path)
     table = {"ascii": _ascii, "binary": _binary, "binary_compressed": _compressed}[header.encoding](data, header)
-    names = header.layout.names
+    names = [name for name in header.layout.names if header.layout[name].shape == ()]
     if not {"x", "y", "z"} <= set(names):
         raise capture_error(path, "FIELDS", " ".join(names), "x, y and z are needed: export the cloud again")
     normal = ("normal_x", "normal_y", "normal_z")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import struct
+import warnings
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import BinaryIO
@@ -23,6 +24,7 @@ COLUMNS = {
 }
 
 
+@np.errstate(invalid="ignore", over="ignore")  # at NaN of the signalling kind
 def read_ply(path: Path) -> RawCloud:
     """Read the vertices as they are: values are not judged, NaN included.
 
@@ -93,7 +95,8 @@ def _binary_columns(file: BinaryIO, header: PlyHeader, index: int, wanted: list[
             file.seek(element.count * element.row.itemsize, io.SEEK_CUR)
     element = header.elements[index]
     if element.has_lists:
-        rows = np.array([[row[i] for i in wanted] for row in _list_rows(file, element, header)], ndmin=2)
+        rows = np.array([[row[i] for i in wanted] for row in _list_rows(file, element, header)])
+        rows = rows.reshape(-1, len(wanted))
         return [rows[:, k].astype(element.properties[i].kind.newbyteorder("=")) for k, i in enumerate(wanted)]
     rows = np.fromfile(file, element.row, element.count)
     if len(rows) < element.count:
@@ -150,7 +153,8 @@ def _ascii_table(lines: Iterable[str], element: Element, wanted: list[int], path
     if not element.count:
         return np.empty((0, len(wanted)))
     try:
-        return np.loadtxt(lines, usecols=wanted, max_rows=element.count, comments=None, ndmin=2)
+        with warnings.catch_warnings(action="ignore"):  # of no lines at all, which the caller tells
+            return np.loadtxt(lines, usecols=wanted, max_rows=element.count, comments=None, ndmin=2)
     except ValueError as error:
         found = str(error).split(";")[0]
         raise capture_error(
@@ -167,12 +171,9 @@ def _pass_over(text: io.TextIOBase, element: Element) -> None:
 def _without_lists(text: io.TextIOBase, element: Element) -> Iterator[str]:
     """Lines with a zero in the place of each list."""
     for line in text:
-        words = iter(line.split())
-        out = []
+        words, at, out = line.split(), 0, []
         for p in element.properties:
-            word = next(words, "")
-            if p.length is not None:
-                for _ in range(int(word) if word.isdigit() else 0):
-                    next(words, None)
+            word = words[at] if at < len(words) else ""
+            at += 1 + (int(word) if p.length is not None and word.isdigit() else 0)
             out.append("0" if p.length is not None else word)
         yield " ".join(out)

@@ -16,7 +16,7 @@ from kerfwright.capture.level import up_of_object
 from kerfwright.capture.photo_floor import floor_in_photos
 from kerfwright.capture.types import Capture, Cloud
 from kerfwright.capture.yaw import upright_turn
-from kerfwright.errors import CaptureError, OptionError
+from kerfwright.errors import CaptureError, OptionError, shown
 
 __all__ = ["PrepareOptions", "crop_options", "prepare"]
 
@@ -91,8 +91,8 @@ def crop_options(text: str) -> dict[str, bool | tuple[float, ...]]:
         box = ()
     if len(box) != 6 or not all(low < high for low, high in zip(box[:3], box[3:], strict=True)):
         raise OptionError(
-            f"--crop: {text}: give auto, none, or the box to keep, lowest corner first: X0,Y0,Z0,X1,Y1,Z1 in the units "
-            "and axes of the cloud's file"
+            f"--crop: {shown(text)}: give auto, none, or the box to keep, lowest corner first: X0,Y0,Z0,X1,Y1,Z1 in "
+            "the units and axes of the cloud's file"
         )
     return {"box": box}
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import struct
+import subprocess
+import sys
+import tempfile
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -19,6 +23,15 @@ __all__ = ["read_e57", "read_las"]
 PACKAGES = {"laspy": "laspy[lazrs]", "pye57": "pye57"}
 LAS_MARK, E57_MARK = b"LASF", b"ASTM-E57"
 LEAST_RECORD = 54  # bytes of the head of a variable length record
+UNPACK = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[3]),) * 2)
+import laspy
+laspy.read(sys.argv[1]).write(sys.argv[2])
+"""
+# So many bytes for libraries and their threads; and so many times the points', which are there raw, read and written.
+UNPACK_ROOM, UNPACK_COPIES = 4 * 2**30, 4
+UNPACK_THREADS = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "RAYON_NUM_THREADS": "4"}
 BEST_COMPRESSION = 200  # times, of LAZ; points of a real cloud come to a tenth of that
 
 
@@ -62,8 +75,11 @@ def _guarded(path: Path, mark: bytes, module: str, read: Callable[[ModuleType, P
         raise capture_error(path, "file", reason, "it is damaged: copy or export it again") from error
 
 
-def _check_las_header(path: Path) -> None:
-    """Refuse what would make laspy read for hours: more records than the file has room for (LAS 1.4 R15, table 3)."""
+def _check_las_header(path: Path) -> tuple[int, int, bool]:
+    """How many points, bytes a point, and whether they are packed.
+
+    Refuses what would make laspy read for hours: more records than the file has room for (LAS 1.4 R15, table 3).
+    """
     with path.open("rb") as file:
         head = file.read(375).ljust(375, b"\0")
     size, minor = path.stat().st_size, head[25]
@@ -80,6 +96,7 @@ def _check_las_header(path: Path) -> None:
     ):
         if number * least > there:
             raise capture_error(path, name, number, "more than the file can hold: copy or export it again")
+    return max(count, many), length, packed
 
 
 def _laz_chunks(path: Path, start: int) -> int:
@@ -92,7 +109,36 @@ def _laz_chunks(path: Path, start: int) -> int:
 
 
 def _las(laspy: ModuleType, path: Path) -> RawCloud:
-    _check_las_header(path)
+    points, length, packed = _check_las_header(path)
+    check_count(points, path, "points")
+    if not packed:
+        return _plain_las(laspy, path)
+    with tempfile.TemporaryDirectory() as scratch:
+        plain = Path(scratch) / "plain.las"
+        _unpack(path, plain, UNPACK_ROOM + UNPACK_COPIES * points * length)
+        return _plain_las(laspy, plain)
+
+
+def _unpack(path: Path, plain: Path, memory: int) -> None:
+    """Write a LAZ file as LAS, in a process of its own: at some damages lazrs ends its process, or asks for all memory.
+
+    Raises
+    ------
+    CaptureError
+        If it cannot be unpacked.
+    """
+    command = [sys.executable, "-P", "-c", UNPACK, str(path), str(plain), str(memory)]
+    done = subprocess.run(
+        command, stdin=subprocess.DEVNULL, capture_output=True, env=os.environ | UNPACK_THREADS, check=False
+    )
+    if done.returncode == 0:
+        return
+    lines = done.stderr.decode("utf-8", "replace").strip().splitlines()
+    reason = lines[-1].strip() if lines else f"lazrs ended with {done.returncode}"
+    raise capture_error(path, "file", reason, "it is damaged: copy or export it again")
+
+
+def _plain_las(laspy: ModuleType, path: Path) -> RawCloud:
     with laspy.open(path) as file:
         check_count(file.header.point_count, path, "points")
         las = file.read()

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kerfwright.errors import shown
 from kerfwright.model.cutpath import Circle, CutPath, Loop
 from kerfwright.model.geometry import edge_end, edge_length, edge_start, path_polygon, sample_loop, signed_area
 from kerfwright.model.types import Board, Model
@@ -40,6 +41,7 @@ class Fault:
         return f"{self.field}: {self.found}: {self.remedy}"
 
 
+@np.errstate(all="ignore")  # numbers too large to be true fail the checks as infinity or NaN
 def faults(model: Model) -> tuple[Fault, ...]:
     """Every contradiction of the model, in the order of its fields."""
     return (
@@ -57,7 +59,7 @@ def _name_faults(model: Model) -> Iterator[Fault]:
             yield Fault(
                 "K101",
                 field,
-                ascii(board.name) if not board.name.isprintable() else repr(board.name),
+                shown(repr(board.name)),
                 f"use up to {_LONGEST} letters, digits, space, _ . -, and begin with a letter or digit",
                 (board.name,),
             )
@@ -65,7 +67,7 @@ def _name_faults(model: Model) -> Iterator[Fault]:
             yield Fault(
                 "K102",
                 field,
-                repr(board.name),
+                shown(repr(board.name)),
                 f"boards[{known}] has this name already: give each its own, case apart",
                 (board.name,),
             )
@@ -79,7 +81,7 @@ def _is_safe(name: str) -> bool:
 
 
 def _board_faults(index: int, board: Board) -> Iterator[Fault]:
-    where = f"boards[{index}] {board.name!r}"
+    where = f"boards[{index}] {shown(repr(board.name))}"
     if board.thickness.value <= 0:
         yield Fault(
             "K103", f"{where}.thickness", f"{board.thickness.value:g} mm", "give a thickness above 0", (board.name,)

@@ -85,8 +85,9 @@ def _explain(error: ValidationError) -> str:
     """The first of pydantic's complaints in one line: field: value: remedy."""
     first = error.errors(include_url=False)[0]
     field = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in first["loc"]).lstrip(".")
+    field = field if len(field) < 100 else field[:97] + "..."
     value = _one_line(repr(first["input"]))
-    return f"{field}: {value if len(value) < 60 else value[:57] + '...'}: {_one_line(first['msg'])}" + _more(
+    return f"{field}: {value if len(value) < 60 else value[:57] + '...'}: {_one_line(first['msg'])[:200]}" + _more(
         error.error_count() - 1
     )
 

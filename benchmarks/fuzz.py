@@ -1,0 +1,410 @@
+"""Damage small whole files at random and read them: only kerfwright's own errors may come out, in bounded memory.
+
+Each parser runs in a process of its own with little memory to spare. An input is made from the seed, the parser's name
+and its number alone, so that any can be made again: `--only NAME --first NUMBER --inputs 1 --keep DIR` writes it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import faulthandler
+import json
+import mmap
+import os
+import random
+import re
+import resource
+import shutil
+import signal
+import struct
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+
+from tables import markdown
+
+from kerfwright.errors import KerfwrightError
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
+
+NUMBERS = (b"0", b"-1", b"nan", b"inf", b"1e999", b"-1e-320", b"1,5", b"4294967296", b"9" * 30, b"1e308", b"0x10", b"")
+WHOLE = (0, 1, -1, 2**7, 2**8 - 1, 2**15, 2**16 - 1, 2**31 - 1, 2**31, 2**32 - 1, 2**62, 2**63 - 1, 2**64 - 1)
+PATIENCE = 30.0  # seconds for one input: a hang
+LONGEST_MESSAGE = 600
+MEMORY = 512 * 2**20  # to spare, beside what the process has once its libraries are loaded
+
+
+@dataclass(frozen=True)
+class Parser:
+    """What is fuzzed: the files of a sample folder of which one at a time is damaged, and what reads them."""
+
+    name: str
+    files: tuple[str, ...]
+    read: Callable[[Path], object]
+    share: float = 1.0  # of the inputs asked for, where one takes long
+    mend: Callable[[bytes], bytes] = bytes  # makes check sums of damaged bytes right, for every other input
+
+
+def parsers() -> list[Parser]:
+    """Every reader of files, and of what is said on the command line."""
+    from kerfwright.cache import read_kept
+    from kerfwright.capture.markers import parse_markers
+    from kerfwright.capture.prepare import crop_options
+    from kerfwright.capture.scans import read_las
+    from kerfwright.config import read_config
+    from kerfwright.model import read_model
+    from kerfwright.output import _read_manifest
+    from kerfwright.scaling import parse_lengths
+    from kerfwright.stock import parse_stock
+    from samples import readers
+
+    def by_name(path: Path) -> object:
+        return readers(path.parent)["." + path.name.rsplit(".")[-1]](path.name)
+
+    def kept(path: Path) -> object:
+        return read_kept(path.parent, "capture")
+
+    def text(parse: Callable, path: Path) -> object:
+        return parse(path.read_text(encoding="utf-8", errors="replace"))
+
+    return [
+        Parser("COLMAP text", ("text/cameras.txt", "text/images.txt"), by_name),
+        Parser("COLMAP binary", ("cameras.bin", "images.bin"), by_name),
+        Parser("Bundler", ("bundle.out", "list.txt"), by_name),
+        Parser("RealityCapture CSV", ("cameras.csv",), by_name),
+        Parser("RealityCapture XMP", ("a.xmp",), by_name),
+        Parser("Metashape XML", ("cameras.xml",), by_name),
+        Parser("Meshroom", ("cameras.sfm",), by_name),
+        Parser("nerfstudio", ("transforms.json",), by_name),
+        Parser("OpenMVG", ("sfm_data.json",), by_name),
+        Parser("PLY", ("simple.ply", "ascii.ply", "binary_little_endian.ply", "binary_big_endian.ply"), by_name),
+        Parser("PCD", ("ascii.pcd", "binary.pcd", "compressed.pcd"), by_name),
+        Parser("XYZ", ("a.xyz",), by_name),
+        Parser("LAS", ("a.las",), by_name),
+        Parser("LAZ", ("a.laz",), read_las, 0.005),
+        Parser("E57", ("a.e57",), by_name, mend=_mend_e57),
+        Parser("image headers", ("a.jpg", "a.png", "a.tif"), by_name),
+        Parser("model.json", ("model.json",), read_model),
+        Parser("manifest", (".kerfwright.json",), _read_manifest),
+        Parser("kept stage", (".cache/capture-0",), kept, mend=_mend_kept),
+        Parser("config.toml", ("config.toml",), read_config),
+        Parser("--length", ("length.txt",), lambda path: text(lambda t: parse_lengths(t.split(";")), path)),
+        Parser("--markers", ("markers.txt",), partial(text, parse_markers)),
+        Parser("--stock", ("stock.txt",), partial(text, parse_stock)),
+        Parser("--crop", ("crop.txt",), partial(text, crop_options)),
+    ]  # fmt: skip
+
+
+def write_all_samples(folder: Path) -> None:
+    """Whole files of all parsers."""
+    import pickle
+
+    from kerfwright.capture.types import Cloud
+    from kerfwright.config import default_config
+    from kerfwright.model import write_model
+    from samples import write_samples
+    from simple import stool
+
+    write_samples(folder)
+    (folder / "text").mkdir()
+    for name in ("cameras.txt", "images.txt"):
+        shutil.copy(folder / name, folder / "text" / name)
+    write_model(stool(), folder / "model.json")
+    (folder / ".kerfwright.json").write_text('{"program": "kerfwright", "files": {"a/b.dxf": "00", "run.json": null}}')
+    (folder / ".cache").mkdir()
+    import numpy as np
+
+    data = pickle.dumps(Cloud(np.eye(3), np.eye(3)), protocol=5)
+    (folder / ".cache" / "capture-0").write_bytes(sha256(data).digest() + data)
+    (folder / "config.toml").write_text(default_config())
+    for name, value in (
+        ("length", "top:x=420mm;leg one:z=.75in"), ("markers", "4x4_50:40mm"), ("stock", "12,18,1/2in"),
+        ("crop", "-1,-2,0.5,1e3,4,5"),
+    ):
+        (folder / f"{name}.txt").write_text(value)
+
+
+def damaged(data: bytes, chance: random.Random) -> bytes:
+    """One to four damages of random kinds."""
+    for _ in range(chance.randint(1, 4)):
+        data = chance.choice(DAMAGES)(data, chance)
+    return data
+
+
+def _stretch(data: bytes, chance: random.Random) -> tuple[int, int]:
+    start = chance.randrange(len(data) + 1)
+    return start, min(len(data), start + int(chance.paretovariate(0.6)))
+
+
+def _flip(data: bytes, chance: random.Random) -> bytes:
+    if not data:
+        return data
+    at = chance.randrange(len(data))
+    return data[:at] + bytes([data[at] ^ 1 << chance.randrange(8)]) + data[at + 1 :]
+
+
+def _noise(data: bytes, chance: random.Random) -> bytes:
+    at = chance.randrange(len(data) + 1)
+    other = chance.randbytes(chance.randint(1, 8))
+    return data[:at] + other + data[at + len(other) :]
+
+
+def _cut(data: bytes, chance: random.Random) -> bytes:
+    start, stop = _stretch(data, chance)
+    return data[:start] + data[stop:]
+
+
+def _truncate(data: bytes, chance: random.Random) -> bytes:
+    return data[: chance.randrange(len(data) + 1)]
+
+
+def _repeat(data: bytes, chance: random.Random) -> bytes:
+    start, stop = _stretch(data, chance)
+    return data[:stop] + data[start:stop] * chance.randint(1, 5) + data[stop:]
+
+
+def _move(data: bytes, chance: random.Random) -> bytes:
+    start, stop = _stretch(data, chance)
+    at = chance.randrange(len(data) + 1)
+    return data[:at] + data[start:stop] + data[at:]
+
+
+def _snippet(data: bytes, chance: random.Random) -> bytes:
+    from samples import SNIPPETS
+
+    start, stop = _stretch(data, chance)
+    return data[:start] + chance.choice(SNIPPETS) + data[stop if chance.random() < 0.5 else start :]
+
+
+def _whole(data: bytes, chance: random.Random) -> bytes:
+    """A number at the edge of what 1 to 8 bytes hold, of either byte order."""
+    size = chance.choice((1, 2, 4, 8))
+    value = (chance.choice(WHOLE) & (1 << 8 * size) - 1).to_bytes(size, chance.choice(("little", "big")))
+    at = chance.randrange(len(data) + 1)
+    return data[:at] + value + data[at + size :]
+
+
+def _real(data: bytes, chance: random.Random) -> bytes:
+    value = chance.choice((float("nan"), float("inf"), -1e308, 1e-320, 0.0))
+    kind = chance.choice(("<d", ">d", "<f", ">f"))
+    packed = struct.pack(kind, value if "d" in kind else value % 1e30)
+    at = chance.randrange(len(data) + 1)
+    return data[:at] + packed + data[at + len(packed) :]
+
+
+def _number(data: bytes, chance: random.Random) -> bytes:
+    """Another number in the place of one that stands there as text."""
+    found = list(re.finditer(rb"-?\d+(\.\d+)?", data[:20000]))
+    if not found:
+        return _noise(data, chance)
+    match = chance.choice(found)
+    return data[: match.start()] + chance.choice(NUMBERS) + data[match.end() :]
+
+
+def _encode(data: bytes, chance: random.Random) -> bytes:
+    kinds = (
+        lambda d: d.decode("latin-1").encode("utf-16"), lambda d: b"\xef\xbb\xbf" + d,
+        lambda d: d.replace(b"\n", b"\r\n"), lambda d: d.replace(b".", b","), lambda d: d * 2,
+    )  # fmt: skip
+    return chance.choice(kinds)(data)
+
+
+def _nest(data: bytes, chance: random.Random) -> bytes:
+    """Brackets, ten thousand deep."""
+    at = chance.randrange(len(data) + 1)
+    return data[:at] + chance.choice((b"[", b"{", b'{"a":', b"<a>", b"(")) * 10000 + data[at:]
+
+
+# Rare ones stand once, those that get past a parser's first lines more often.
+DAMAGES = (_flip, _flip, _noise, _noise, _cut, _cut, _truncate, _repeat, _move, _snippet, _snippet, _whole, _whole,
+           _real, _number, _number, _number, _number, _encode) * 3 + (_nest,)  # fmt: skip
+
+
+def damaged_input(parser: Parser, folder: Path, seed: int, number: int) -> tuple[str, bytes]:
+    """The name and the damaged bytes of one input."""
+    chance = random.Random(f"{seed} {parser.name} {number}")
+    name = parser.files[number % len(parser.files)]
+    data = damaged((folder / name).read_bytes(), chance)
+    return name, parser.mend(data) if chance.random() < 0.5 else data
+
+
+def _mend_kept(data: bytes) -> bytes:
+    return sha256(data[32:]).digest() + data[32:]
+
+
+def _mend_e57(data: bytes) -> bytes:
+    """Every page of 1024 bytes ends with the CRC-32C of the others (ASTM E2807, 8.2)."""
+    pages = (data[k : k + 1020] for k in range(0, len(data), 1024))
+    return b"".join(page + _crc32c(page).to_bytes(4, "big") for page in pages)
+
+
+def _crc32c(data: bytes) -> int:
+    value = 0xFFFFFFFF
+    for byte in data:
+        value = _CRC[(value ^ byte) & 255] ^ value >> 8
+    return value ^ 0xFFFFFFFF
+
+
+def _crc_row(value: int) -> int:
+    for _ in range(8):
+        value = value >> 1 ^ (0x82F63B78 if value & 1 else 0)
+    return value
+
+
+_CRC = tuple(map(_crc_row, range(256)))
+
+
+def read_one(parser: Parser, good: Path, folder: Path, seed: int, number: int) -> str:
+    """What came of it: read, refused, or a line of what should not have come out."""
+    name, data = damaged_input(parser, good, seed, number)
+    path = folder / name
+    path.write_bytes(data)
+    try:
+        parser.read(path)
+        return "read"
+    except KerfwrightError as error:
+        short = "\n" not in str(error) and len(str(error)) < LONGEST_MESSAGE
+        return "refused" if short else f"message of {len(str(error))} signs: {str(error)[:200]!r}"
+    except BaseException as error:
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        place = f"{Path(frame.filename).name}:{frame.lineno}"
+        return f"{type(error).__name__} at {place}: {' '.join(str(error).split())[:160]}"
+    finally:
+        path.write_bytes((good / name).read_bytes())
+
+
+class Tally:
+    """Counts that outlive the process that writes them: next number, read, refused."""
+
+    def __init__(self) -> None:
+        self._map = mmap.mmap(-1, 24)
+
+    def __getitem__(self, k: int) -> int:
+        return struct.unpack_from("<q", self._map, 8 * k)[0]
+
+    def add(self, k: int, count: int = 1) -> None:
+        struct.pack_into("<q", self._map, 8 * k, self[k] + count)
+
+
+def _work(parser: Parser, good: Path, folder: Path, tally: Tally, seed: int, last: int, log: Path) -> None:
+    """In a child: read until the last number, or until something ends the process."""
+    os.nice(19)
+    faulthandler.disable()
+    warnings.simplefilter("error")
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 1)
+    os.dup2(null, 2)
+    parser.read(folder / parser.files[0])  # loads libraries
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, resource.RLIM_INFINITY))
+    while tally[0] < last:
+        number = tally[0]
+        what = read_one(parser, good, folder, seed, number)
+        if what in ("read", "refused"):
+            tally.add(1 if what == "read" else 2)
+        else:
+            _note(log, parser.name, number, what)
+        tally.add(0)
+
+
+def _note(log: Path, name: str, number: int, what: str) -> None:
+    with log.open("a") as stream:
+        stream.write(json.dumps({"parser": name, "number": number, "what": what}) + "\n")
+
+
+def _one_process(parser: Parser, good: Path, tally: Tally, seed: int, last: int, log: Path) -> None:
+    """Run a child to its end; what ended it early goes into the log, and the input is passed over."""
+    with tempfile.TemporaryDirectory(dir=good.parent) as scratch:
+        folder = Path(scratch) / "samples"
+        shutil.copytree(good, folder)
+        child = os.fork()
+        if child == 0:
+            try:
+                _work(parser, good, folder, tally, seed, last, log)
+                os._exit(0)
+            except BaseException:
+                _note(log, parser.name, -1, traceback.format_exc()[-600:])
+                os._exit(1)
+        status = _watch(child, tally)
+    if status == 0:
+        return
+    if os.WIFEXITED(status):
+        raise SystemExit(f"{parser.name}: the fuzzer itself failed: see {log}")
+    number = tally[0]
+    _note(log, parser.name, number, f"process ended by {signal.Signals(os.WTERMSIG(status)).name}")
+    tally.add(0)
+
+
+def _watch(child: int, tally: Tally) -> int:
+    seen, since = tally[0], time.monotonic()
+    while True:
+        done, status = os.waitpid(child, os.WNOHANG)
+        if done:
+            return status
+        if tally[0] != seen:
+            seen, since = tally[0], time.monotonic()
+        elif time.monotonic() - since > PATIENCE:
+            os.kill(child, signal.SIGALRM)  # the mark of a hang
+        time.sleep(0.05)
+
+
+def fuzz(parser: Parser, good: Path, seed: int, first: int, inputs: int, log: Path) -> dict[str, object]:
+    """Read so many inputs; what was read, refused and otherwise, and seconds."""
+    tally, begin = Tally(), time.monotonic()
+    tally.add(0, first)
+    last = first + max(1, int(inputs * parser.share))
+    while tally[0] < last:
+        _one_process(parser, good, tally, seed, last, log)
+    count = tally[0] - first
+    result = {"parser": parser.name, "inputs": count, "read": tally[1], "refused": tally[2],
+              "else": count - tally[1] - tally[2], "seconds": round(time.monotonic() - begin, 1)}  # fmt: skip
+    print(json.dumps(result), flush=True)
+    return result
+
+
+def _keep(parser: Parser, good: Path, given: argparse.Namespace) -> None:
+    given.keep.mkdir(parents=True, exist_ok=True)
+    name, data = damaged_input(parser, good, given.seed, given.first)
+    (given.keep / f"{given.first}_{Path(name).name}").write_bytes(data)
+
+
+def main() -> None:
+    command = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    command.add_argument("--out", type=Path, required=True)
+    command.add_argument("--inputs", type=int, default=100_000)
+    command.add_argument("--first", type=int, default=0)
+    command.add_argument("--seed", type=int, default=0)
+    command.add_argument("--jobs", type=int, default=1)
+    command.add_argument("--only", action="append", help="name of a parser; may be repeated")
+    command.add_argument("--keep", type=Path, help="write the first input there instead of reading it")
+    given = command.parse_args()
+    given.out.mkdir(parents=True, exist_ok=True)
+    log = given.out / "fuzz.jsonl"
+    log.unlink(missing_ok=True)
+    with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as scratch:
+        good = Path(scratch) / "good"
+        good.mkdir()
+        write_all_samples(good)
+        chosen = [p for p in parsers() if not given.only or p.name in given.only]
+        if given.keep:
+            return [_keep(p, good, given) for p in chosen] and None
+        with ThreadPoolExecutor(given.jobs) as pool:
+            run = partial(fuzz, good=good, seed=given.seed, first=given.first, inputs=given.inputs, log=log)
+            results = list(pool.map(run, chosen))
+    table = markdown(list(results[0]), [[f"{v}" for v in r.values()] for r in results])
+    (given.out / "fuzz.md").write_text(table)
+    print(table)
+    if any(r["else"] for r in results):
+        raise SystemExit(f"see {log}")
+
+
+if __name__ == "__main__":
+    main()
