@@ -241,11 +241,13 @@ def test_turned_moved_and_scaled_clouds_have_the_same_boards(angle, shift, scale
     motion[:2, 3] = np.multiply(scale, shift)
     points = cloud.points @ motion[:3, :3].T + motion[:3, 3]
     found = _boards(Cloud(points, cloud.normals @ motion[:3, :3].T / scale), np.linalg.inv(motion))
-    _assert_same_boards(found, wanted, 1.5)
+    _assert_same_boards(found, wanted, 2.5)  # mm: regions have the cloud's spacing, 8 mm, for their grain
 
 
 @SLOW
 @given(st.integers(0, 2**32 - 1))
 def test_the_order_of_points_does_not_matter(seed):
+    """To .26 mm, of regions whose cloud has 8 mm between points; not to nothing: see docs/benchmarks.md."""
     cloud, wanted = _table()
-    _assert_same_boards(_boards(cloud.select(np.random.default_rng(seed).permutation(len(cloud)))), wanted, 1.5)
+    shuffled = cloud.select(np.random.default_rng(seed).permutation(len(cloud)))
+    _assert_same_boards(_boards(shuffled), wanted, 0.5)

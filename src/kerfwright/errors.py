@@ -12,10 +12,10 @@ __all__ = [
 SHOWN_LENGTH = 60
 
 
-def shown(found: object) -> str:
+def shown(found: object, longest: int = SHOWN_LENGTH) -> str:
     """A value as an error shows it: one line, printable, not too long."""
     text = ascii(found) if not isinstance(found, str) or not found.isprintable() else found
-    return text if len(text) <= SHOWN_LENGTH else text[: SHOWN_LENGTH - 3] + "..."
+    return text if len(text) <= longest else text[: longest - 3] + "..."
 
 
 class KerfwrightError(Exception):

@@ -113,6 +113,13 @@ def test_what_fuzzing_found(good, tmp_path, name, old, new, told):
         read_only(good, tmp_path, name, data.replace(old, new, 1))
 
 
+def test_long_names_are_told_shortly(tmp_path):
+    (tmp_path / "a.ply").write_text(f"ply\nformat ascii 1.0\nelement {'(' * 9000} 7\nproperty float x\nend_header\n")
+    with pytest.raises(CaptureError) as caught:
+        read_ply(tmp_path / "a.ply")
+    assert len(str(caught.value)) < 600
+
+
 @pytest.mark.filterwarnings("error")
 def test_a_text_cloud_without_a_line_is_told_without_a_warning(tmp_path):
     header = "ply\nformat ascii 1.0\nelement vertex 4\n" + "".join(f"property float {a}\n" for a in "xyz")

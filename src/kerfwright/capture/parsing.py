@@ -10,9 +10,12 @@ from kerfwright.errors import CaptureError, shown
 __all__ = ["capture_error", "finite_float", "read_bytes", "read_lines", "shown", "whole_number"]
 
 
+LONGEST_FIELD = 120  # signs; names of elements come from the file
+
+
 def capture_error(path: Path | str, field: str, found: object, remedy: str) -> CaptureError:
     """The error for a field of a file: path, field, value found, what to do."""
-    return CaptureError(f"{path}: {field}: {shown(found)}: {remedy}")
+    return CaptureError(f"{path}: {shown(field, LONGEST_FIELD)}: {shown(found)}: {remedy}")
 
 
 def finite_float(text: str, path: Path, field: str) -> float:
