@@ -195,7 +195,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
     ("old", "new"),
     [
         ('"name": "top"', f'"name": "{"<" * 9000}"'), ('"stock"', f'"{"(" * 9000}"'),
-        ('"kind": "line"', f'"kind": "{"x" * 9000}"'),
+        ('"kind": "line"', f'"kind": "{"x" * 9000}"'), ('"a": "top"', f'"a": "{"[" * 9000}"'),
     ],
 )  # fmt: skip
 def test_long_names_are_told_shortly(tmp_path, old, new):

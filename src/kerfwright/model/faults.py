@@ -166,13 +166,13 @@ def _reference_faults(model: Model) -> Iterator[Fault]:
     names = {board.name for board in model.boards}
     for field, name in _named(model):
         if name not in names:
-            yield Fault("K108", field, repr(name), "no board has this name")
+            yield Fault("K108", field, shown(repr(name)), "no board has this name")
     for field, index in _numbered(model):
         if not 0 <= index < len(model.contacts):
             yield Fault("K108", field, str(index), f"the model has {len(model.contacts)} contacts, counted from 0")
     for k, contact in enumerate(model.contacts):
         if contact.a == contact.b:
-            yield Fault("K108", f"contacts[{k}]", repr(contact.a), "a board cannot touch itself", (contact.a,))
+            yield Fault("K108", f"contacts[{k}]", shown(repr(contact.a)), "a board cannot touch itself", (contact.a,))
 
 
 def _named(model: Model) -> Iterator[tuple[str, str]]:
@@ -181,7 +181,7 @@ def _named(model: Model) -> Iterator[tuple[str, str]]:
         yield f"contacts[{k}].b", contact.b
     for k, board in enumerate(model.boards):
         if board.same_as is not None:
-            yield f"boards[{k}] {board.name!r}.same_as", board.same_as
+            yield f"boards[{k}] {shown(repr(board.name))}.same_as", board.same_as
     for k, step in enumerate(model.build_steps):
         for name in step.boards:
             yield f"build_steps[{k}].boards", name
@@ -193,4 +193,4 @@ def _numbered(model: Model) -> Iterator[tuple[str, int]]:
     for i, board in enumerate(model.boards):
         for k, bevel in enumerate(board.bevels):
             if bevel.contact is not None:
-                yield f"boards[{i}] {board.name!r}.bevels[{k}].contact", bevel.contact
+                yield f"boards[{i}] {shown(repr(board.name))}.bevels[{k}].contact", bevel.contact
