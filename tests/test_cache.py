@@ -160,3 +160,11 @@ def test_a_kept_result_that_is_no_pickle_is_told(tmp_path, data):
     (tmp_path / "capture-0").write_bytes(hashlib.sha256(data).digest() + data)
     with pytest.raises(OutputError, match=r"cache: \w+: not what kerfwright keeps there"):
         read_kept(tmp_path, "capture")
+
+
+def test_names_in_a_stranger_s_cache_are_told_in_one_line(tmp_path):
+    data = b"cnumpy\ndt\rpe\n."
+    (tmp_path / "capture-0").write_bytes(hashlib.sha256(data).digest() + data)
+    with pytest.raises(OutputError) as caught:
+        read_kept(tmp_path, "capture")
+    assert str(caught.value).isprintable()

@@ -129,7 +129,8 @@ class _Unpickler(pickle.Unpickler):
                 return found
         elif (module, name) in _ALLOWED:
             return super().find_class(module, name)
-        raise OutputError(f"cache: {module}.{name}: not what kerfwright keeps there: delete the folder's .cache")
+        found = shown(f"{module}.{name}")
+        raise OutputError(f"cache: {found}: not what kerfwright keeps there: delete the folder's .cache")
 
 
 def folder_hash(folder: Path, leave_out: Path | None = None) -> str:
