@@ -56,14 +56,10 @@ class Parser:
 def parsers() -> list[Parser]:
     """Every reader of files, and of what is said on the command line."""
     from kerfwright.cache import read_kept
-    from kerfwright.capture.markers import parse_markers
-    from kerfwright.capture.prepare import crop_options
     from kerfwright.capture.scans import read_las
     from kerfwright.config import read_config
     from kerfwright.model import read_model
     from kerfwright.output import _read_manifest
-    from kerfwright.scaling import parse_lengths
-    from kerfwright.stock import parse_stock
     from samples import readers
 
     def by_name(path: Path) -> object:
@@ -71,9 +67,6 @@ def parsers() -> list[Parser]:
 
     def kept(path: Path) -> object:
         return read_kept(path.parent, "capture")
-
-    def text(parse: Callable, path: Path) -> object:
-        return parse(path.read_text(encoding="utf-8", errors="replace"))
 
     return [
         Parser("COLMAP text", ("text/cameras.txt", "text/images.txt"), by_name),
@@ -96,11 +89,26 @@ def parsers() -> list[Parser]:
         Parser("manifest", (".kerfwright.json",), _read_manifest),
         Parser("kept stage", (".cache/capture-0",), kept, mend=_mend_kept),
         Parser("config.toml", ("config.toml",), read_config),
-        Parser("--length", ("length.txt",), lambda path: text(lambda t: parse_lengths(t.split(";")), path)),
+        *_option_parsers(),
+    ]  # fmt: skip
+
+
+def _option_parsers() -> list[Parser]:
+    """What reads the texts of options."""
+    from kerfwright.capture.markers import parse_markers
+    from kerfwright.capture.prepare import crop_options
+    from kerfwright.scaling import parse_lengths
+    from kerfwright.stock import parse_stock
+
+    def text(parse: Callable, path: Path) -> object:
+        return parse(path.read_text(encoding="utf-8", errors="replace"))
+
+    return [
+        Parser("--length", ("length.txt",), partial(text, lambda said: parse_lengths(said.split(";")))),
         Parser("--markers", ("markers.txt",), partial(text, parse_markers)),
         Parser("--stock", ("stock.txt",), partial(text, parse_stock)),
         Parser("--crop", ("crop.txt",), partial(text, crop_options)),
-    ]  # fmt: skip
+    ]
 
 
 def write_all_samples(folder: Path) -> None:

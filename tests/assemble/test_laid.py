@@ -78,6 +78,16 @@ def test_faces_that_are_both_seen_stay_apart():
     assert moved[1].thickness.value == 26 and laid_contacts(moved, 7.0) == []
 
 
+def test_a_board_far_off_the_plane_does_not_move_it():
+    _, cloud = stool(22.0)
+    at = (("a", 410, -150, 120), ("b", 418, 0, 90))
+    slats = [sheet(name, pose((0, 0, z)), 20, (-200, y, 200, y + wide)) for name, z, y, wide in at]
+    rail = sheet("rail", pose((0, 0, 380)), 24, (-30, -140, 30, 140))
+    moved = laid_on((*slats, rail), cloud, BLIND, OPTIONS)
+    assert [s.world_from_board[2, 3] for s in moved[:2]] == [410, 418]
+    assert moved[2].thickness.value == pytest.approx(30), "it reaches the larger one exactly"
+
+
 def test_slats_on_two_rails_are_made_flush():
     """Each slat has its own plane, within what can be measured; no rail could touch them all."""
     _, cloud = stool(22.0)

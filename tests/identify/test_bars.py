@@ -11,6 +11,7 @@ from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.primitives import find_planes, look_around
 
 OPTIONS = IdentifyOptions()
+FRINGE = 12.0
 SEAT = ((-220.0, -150.0, 410.0), (220.0, 150.0, 430.0))
 LEGS = tuple(((-120.0, y, 0.0), (-60.0, y + 20, 380.0)) for y in (-130.0, 110.0))
 RAIL = ((-120.0, -140.0, 380.0), (-60.0, 140.0, 410.0))
@@ -26,7 +27,7 @@ def only_ends(cloud: Cloud) -> Cloud:
 def bars(cloud: Cloud):
     around = look_around(cloud, OPTIONS)
     capture = cloud_only(cloud)
-    return find_bars(capture, around, find_planes(cloud, around, OPTIONS), Photos(capture), OPTIONS)
+    return find_bars(capture, find_planes(cloud, around, OPTIONS), Photos(capture), FRINGE, OPTIONS)
 
 
 def test_a_rail_that_shows_only_its_ends():

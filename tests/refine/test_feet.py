@@ -95,8 +95,9 @@ def test_normal_matrix_is_the_sum_over_samples():
         r, slope = edge_residuals(kinds[k], edges[k], points[edge == k])
         ratio = 1 + (r / 1.6) ** 2
         pull = blocks[k] - slope.T @ (slope * (1.7 / ratio**2)[:, None])
-        assert np.abs(pull - np.diag(np.diag(pull))).max() < 1e-9
-        assert (np.diag(pull) > 0).sum() == (4 if kinds[k] == CUBIC else 0) or np.abs(pull).max() < 1e-9
+        chord = np.hypot(80, 20)  # handles are pulled to its thirds; nothing else is
+        handles = [0] * 4 + [0.25 / chord**2 if kinds[k] == CUBIC else 0] * 4
+        assert pull == pytest.approx(np.diag(handles), abs=1e-9)
         assert right[k, :4] == pytest.approx(-(slope.T @ (1.7 / ratio**2 * r))[:4])
         total += float((1.7 * r**2 / ratio).sum())
     assert chi2 == pytest.approx(total)

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 
 from kerfwright.assemble.options import AssembleOptions, Stock
 from kerfwright.assemble.types import Assembly, ConstraintSegment
-from kerfwright.capture.types import Capture
+from kerfwright.capture.types import Capture, Cloud
 from kerfwright.identify.types import Parts, Sheet
 
 if TYPE_CHECKING:
     from kerfwright.assemble.contacts import Decided
+    from kerfwright.identify.freespace import FreeSpace
+    from kerfwright.identify.photo_edges import Photos
 
 __all__ = ["AssembleOptions", "Assembly", "ConstraintSegment", "Stock", "assemble"]
 
@@ -24,7 +26,7 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     from kerfwright.assemble.align import align_sheets
     from kerfwright.assemble.backs import measured_backs
     from kerfwright.assemble.constraints import constraint_segments
-    from kerfwright.assemble.contacts import find_contacts, to_contact
+    from kerfwright.assemble.contacts import to_contact
     from kerfwright.assemble.flush import flush_neighbours
     from kerfwright.assemble.gaps import mended
     from kerfwright.assemble.laid import laid_contacts, laid_on
@@ -46,23 +48,35 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     sheets = mended(sheets, capture.cloud, free, options)
     sheets = flush_neighbours(share_thickness(sheets, diameter, options), diameter, options)
     sheets = laid_on(sheets, capture.cloud, free, options)
-    decided: list[Decided] = []
-    for _ in range(options.passes):
-        decided = find_contacts(sheets, capture.cloud, photos, free, options, decided)
-        segments = constraint_segments(sheets, decided, diameter, options)
-        filled = _run_on(sheets, segments, options.far_reach * diameter)
-        if all(a.region.equals(b.region) for a, b in zip(sheets, filled, strict=True)):
-            break
-        sheets = filled
+    sheets, decided, segments = _met(sheets, capture.cloud, photos, free, options)
     if options.stock.sizes:
         sheets = flush_neighbours(snapped_to_stock(sheets, decided, parts.noise, options), diameter, options)
-        decided = moved_with(sheets, decided)
-        segments = constraint_segments(sheets, decided, diameter, options)
         sheets = laid_on(sheets, capture.cloud, free, options)
+        decided = moved_with(sheets, decided)  # last of all: segments lie on the faces that the boards have in the end
+        segments = constraint_segments(sheets, decided, diameter, options)
     laid = laid_contacts(sheets, options.min_contact * diameter)
     contacts = (*(to_contact(d, sheets) for d in decided), *laid)
     edges = still_open(edges, segments)
     return Assembly(sheets, contacts, tuple(a + b for a, b in zip(segments, edges, strict=True)))
+
+
+def _met(
+    sheets: tuple[Sheet, ...], cloud: Cloud, photos: Photos, free: FreeSpace, options: AssembleOptions
+) -> tuple[tuple[Sheet, ...], list[Decided], tuple[tuple[ConstraintSegment, ...], ...]]:
+    """Contacts and constraint segments, looked for again once boards were run on to what they end on; and the boards.
+    """
+    from kerfwright.assemble.constraints import constraint_segments
+    from kerfwright.assemble.contacts import find_contacts
+
+    decided: list[Decided] = []
+    for _ in range(options.passes):
+        decided = find_contacts(sheets, cloud, photos, free, options, decided)
+        segments = constraint_segments(sheets, decided, cloud.diameter, options)
+        filled = _run_on(sheets, segments, options.far_reach * cloud.diameter)
+        if all(a.region.equals(b.region) for a, b in zip(sheets, filled, strict=True)):
+            break
+        sheets = filled
+    return sheets, decided, segments
 
 
 def _run_on(

@@ -71,15 +71,19 @@ def _groups(links: list[_Link]) -> list[list[_Link]]:
 
 
 def _on_one_plane(sheets: tuple[Sheet, ...], group: list[_Link], furthest: float) -> tuple[Sheet, ...]:
-    """Boards that hold the plane are moved to their mean, by no more than `furthest` mm; then hidden faces onto it."""
+    """Hidden faces put on one plane: of the largest board that holds it, and of those within `furthest` mm of that one,
+    which are moved to their common mean. A board further off stays, and the checker tells what it runs into.
+    """
     hidden = {link.hidden for link in group}
     holding = sorted({link.other for link in group} - hidden) or sorted(hidden)
     normal = face_plane(sheets[holding[0][0]], holding[0][1])[0]
-    offsets = [_offset(sheets[k], face, normal) for k, face in holding]
-    level = float(np.average(offsets, weights=[sheets[k].region.area for k, _ in holding]))
+    offsets = np.array([_offset(sheets[k], face, normal) for k, face in holding])
+    areas = np.array([sheets[k].region.area for k, _ in holding])
+    near = np.abs(offsets - offsets[areas.argmax()]) <= furthest
+    level = float(np.average(offsets[near], weights=areas[near]))
     moved = list(sheets)
-    for (k, face), offset in zip(holding, offsets, strict=True):
-        if (k, face) not in hidden and abs(level - offset) <= furthest:
+    for (k, face), offset, beside in zip(holding, offsets, near, strict=True):
+        if (k, face) not in hidden and beside:
             frame = moved[k].world_from_board.copy()
             frame[:3, 3] += (level - offset) * normal
             moved[k] = replace(moved[k], world_from_board=frame)

@@ -15,7 +15,6 @@ from shapely.geometry import Polygon, box
 from kerfwright.capture.types import Capture
 from kerfwright.identify.options import IdentifyOptions
 from kerfwright.identify.photo_edges import Photos, sweep_edge
-from kerfwright.identify.primitives import Neighbourhood
 from kerfwright.identify.thickness import ThicknessHypothesis
 from kerfwright.identify.types import Primitive
 
@@ -51,14 +50,14 @@ class _Ends:
 
 
 def find_bars(
-    capture: Capture, around: Neighbourhood, planes: Sequence[Primitive], photos: Photos, options: IdentifyOptions,
+    capture: Capture, planes: Sequence[Primitive], photos: Photos, fringe: float, options: IdentifyOptions,
 ) -> list[Bar]:
-    """Bars between pairs of end patches, in the order of the patches."""
+    """Bars between pairs of end patches, in the order of the patches; fringe: mm by which stereo widens a silhouette.
+    """
     diameter, points = capture.cloud.diameter, capture.cloud.points
     least, most = options.min_thickness * diameter, options.max_thickness * diameter
     small = [k for k, p in enumerate(planes) if least < _side(points[p.point_idx]) < most]
     directions = [p.normal for p in sorted(planes, key=lambda p: -len(p.point_idx))]
-    fringe = max(4 * around.spacing, diameter / 60)
     found = []
     for i, one in enumerate(small):
         for other in small[i + 1 :]:

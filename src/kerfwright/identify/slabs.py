@@ -99,7 +99,7 @@ def _bars(scene: _Scene, known: list[Slab]) -> list[Slab]:
     found: list[Slab] = []
     if not known:  # a bar is a hidden part of something: opposite patches of a ball are none
         return found
-    for bar in find_bars(scene.capture, scene.around, scene.planes, scene.photos, scene.options):
+    for bar in find_bars(scene.capture, scene.planes, scene.photos, scene.fringe, scene.options):
         ends = [scene.capture.cloud.points[scene.planes[k].point_idx] for k in bar.ends]
         if any(all(_holds(scene, slab, end) for end in ends) for slab in known):
             continue
