@@ -166,3 +166,11 @@ def test_no_loops_and_senseless_options_are_refused():
         fit_cut_path([])
     with pytest.raises(OptionError, match="correlation_length"):
         CurveOptions(correlation_length=0)
+
+
+def test_relations_can_be_left_out():
+    loops = [boundary([(0, 0), (200, 0), (200, 100), (0, 100)])]
+    with_them, without = (fit_curves(loops, options=CurveOptions(use_relations=on)) for on in (True, False))
+    assert any(r.startswith("parallel") for r in with_them.relations)
+    assert without.relations == ()
+    assert without.chi2 < with_them.chi2

@@ -37,7 +37,7 @@ def test_a_traced_rectangle_becomes_four_lines_that_end_on_their_segment():
 
 
 def test_a_boundary_that_cannot_be_fitted_becomes_a_polygon_and_says_so(monkeypatch):
-    def fails(loops, segments):
+    def fails(loops, segments, options):
         raise StageError("curves: too rough")
 
     monkeypatch.setattr(finish, "fit_curves", fails)

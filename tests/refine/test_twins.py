@@ -195,7 +195,7 @@ def test_a_joint_path_that_cannot_be_fitted_leaves_both_alone(monkeypatch):
 
     boards = [fitted("a", BRACKET, seed=1), fitted("b", BRACKET, seed=2)]
 
-    def fails(loops, segments):
+    def fails(loops, segments, options):
         raise StageError("too rough")
 
     monkeypatch.setattr(twins, "fit_curves", fails)

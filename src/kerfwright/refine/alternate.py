@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
+from shapely.geometry import Polygon
 
 from kerfwright.assemble import AssembleOptions, assemble
 from kerfwright.assemble.apart import kept_apart
@@ -43,6 +44,7 @@ def traced_pieces(
 ) -> tuple[Piece, ...]:
     """The boards with what the photographs show of their outlines; those with seams in them taken apart."""
     diameter = capture.cloud.diameter
+    assembly = assembly if options.use_constraints else _unconstrained(assembly)
     free = see_through(capture, parts.spacing, max(5 * parts.noise, diameter / 150))
     segmenting = SegmentOptions(use_images=options.use_images)
     found = segment_boards(assembly.sheets, assembly.constraints, capture, segmenting, free)
@@ -74,7 +76,21 @@ def assembled_again(
     """One outline a board and the assembly found with them."""
     found = replace(parts, sheets=tuple(p.sheet for p in pieces))
     again = assemble(found, capture, replace(EXACT, stock=options.stock))
-    return tuple(p.outline for p in pieces), kept_apart(_with_seams(again, pieces), capture.cloud.diameter)
+    again = kept_apart(_with_seams(again, pieces), capture.cloud.diameter)
+    if not options.use_constraints:
+        again = _unconstrained(_with_regions(again, [p.sheet.region for p in pieces]))
+    return tuple(p.outline for p in pieces), again
+
+
+def _unconstrained(assembly: Assembly) -> Assembly:
+    """The assembly with nothing that its contacts say of cut paths."""
+    return replace(assembly, constraints=tuple(() for _ in assembly.sheets))
+
+
+def _with_regions(assembly: Assembly, regions: Sequence[Polygon]) -> Assembly:
+    """The assembly with its boards cut to other regions: those that they had before they were run on to contacts."""
+    sheets = zip(assembly.sheets, regions, strict=True)
+    return replace(assembly, sheets=tuple(replace(sheet, region=region) for sheet, region in sheets))
 
 
 def _split(pieces: list[Piece], assembly: Assembly, capture: Capture) -> list[Piece]:

@@ -16,7 +16,7 @@ from kerfwright.model import CutPath, Finding, Line, Loop
 from kerfwright.model.geometry import edge_length
 from kerfwright.refine.boards import to_boards
 from kerfwright.refine.constrain import to_loops
-from kerfwright.refine.curves import fit_curves
+from kerfwright.refine.curves import CurveOptions, fit_curves
 from kerfwright.refine.options import Refined, RefineOptions
 from kerfwright.refine.twins import with_twins
 from kerfwright.refine.types import Fitted, Outline
@@ -29,8 +29,11 @@ SMOOTHED = "spurs of the boundary were left out: it was too rough to fit as trac
 
 def finished(outlines: tuple[Outline, ...], assembly: Assembly, capture: Capture, options: RefineOptions) -> Refined:
     """Fit every cut path on its constraint segments."""
-    fitted = with_twins([_fitted(k, outline, assembly, capture.cloud.diameter, options)
-                         for k, outline in enumerate(outlines)])  # fmt: skip
+    diameter, curves = capture.cloud.diameter, CurveOptions(use_relations=options.use_constraints)
+    step = options.boundary_step * diameter
+    fitted = with_twins(
+        [_fitted(k, outline, assembly, diameter, step, curves) for k, outline in enumerate(outlines)], curves
+    )
     boards = to_boards(fitted)
     findings = [
         Finding(code="K010", severity="warning", message=f"{board.name}: {note}", boards=(board.name,))
@@ -39,16 +42,17 @@ def finished(outlines: tuple[Outline, ...], assembly: Assembly, capture: Capture
     return Refined(boards, assembly.contacts, (*assembly.findings, *findings))
 
 
-def _fitted(number: int, outline: Outline, assembly: Assembly, diameter: float, options: RefineOptions) -> Fitted:
+def _fitted(
+    number: int, outline: Outline, assembly: Assembly, diameter: float, step: float, curves: CurveOptions
+) -> Fitted:
     sheet, segments = assembly.sheets[number], assembly.constraints[number]
     region = constrained_region(sheet.region, segments, diameter / 6, diameter / 20)
-    step = options.boundary_step * diameter
     attempts = [(region, ()), (_smoothed(region, segments, diameter), (SMOOTHED,))]
     problem = ""
     for shape, remarks in attempts:
         loops = to_loops(shape, outline, segments, step)
         try:
-            fit = fit_curves(loops, segments)
+            fit = fit_curves(loops, segments, curves)
             _refuse_short_edges(fit.path)
         except StageError as error:
             problem = str(error)

@@ -15,6 +15,7 @@ class RefineOptions:
     """What refinement may be told; lengths are fractions of the cloud's largest side D."""
 
     use_images: bool = True  # false: cut paths come from the cloud alone
+    use_constraints: bool = True  # false: cut paths follow what was traced, neither contacts nor relations of edges
     boundary_step: float = 1 / 450  # spacing of boundary points handed to curve fitting
     stock: Stock = field(default_factory=Stock)  # thicknesses to snap to, in the stages' units
     seed: int = 0

@@ -15,7 +15,7 @@ from kerfwright.errors import StageError
 from kerfwright.model import CutPath, Line
 from kerfwright.model.geometry import transform_path
 from kerfwright.refine.congruence import Contour, agree, best_motion, contour_of, moved_points
-from kerfwright.refine.curves import fit_curves
+from kerfwright.refine.curves import CurveOptions, fit_curves
 from kerfwright.refine.types import BoundaryLoop, Fitted, Twin
 
 __all__ = ["with_twins"]
@@ -32,9 +32,9 @@ HARD = ("contact", "corner")  # segments on planes of other boards; the floor an
 Members = list[tuple[int, np.ndarray]]  # boards and the motions that lay them on the first
 
 
-def with_twins(fitted: Sequence[Fitted]) -> tuple[Fitted, ...]:
-    """The boards, congruent ones with one cut path. The first of each group keeps its name, the others say whose twin
-    they are.
+def with_twins(fitted: Sequence[Fitted], curves: CurveOptions | None = None) -> tuple[Fitted, ...]:
+    """The boards, congruent ones with one cut path, fitted as `curves` says. The first of each group keeps its name,
+    the others say whose twin they are.
     """
     out = list(fitted)
     contours = [contour_of(f.loops) for f in fitted]
@@ -45,7 +45,7 @@ def with_twins(fitted: Sequence[Fitted]) -> tuple[Fitted, ...]:
         for other in range(first + 1, len(out)):
             if out[other].twin is None and _comparable(fitted[first], fitted[other]):
                 motion = _laid_on(first, other, fitted, contours)
-                joint = None if motion is None else _joint([*members, (other, motion)], fitted, contours)
+                joint = None if motion is None else _joint([*members, (other, motion)], fitted, contours, curves)
                 if joint is not None:
                     members.append((other, motion))
                     for (k, _), board in zip(members, joint, strict=True):
@@ -78,7 +78,9 @@ def _held_errors(board: Fitted, contour: Contour) -> np.ndarray:
     return error
 
 
-def _joint(members: Members, fitted: Sequence[Fitted], contours: Sequence[Contour]) -> list[Fitted] | None:
+def _joint(
+    members: Members, fitted: Sequence[Fitted], contours: Sequence[Contour], curves: CurveOptions | None
+) -> list[Fitted] | None:
     """The members with one path; None when it would leave a plane or a boundary, or cannot be fitted."""
     first = members[0][0]
     segments = _shared_segments([[_moved_segment(s, m) for s in fitted[k].segments] for k, m in members])
@@ -86,7 +88,7 @@ def _joint(members: Members, fitted: Sequence[Fitted], contours: Sequence[Contou
         return None
     loops = _mean_loops(members, fitted, contours)
     try:
-        fit = fit_curves(loops, segments)
+        fit = fit_curves(loops, segments, curves)
     except StageError:
         return None
     path = _shifted(fit.path, _way_to_planes(fit.path, fitted[first]))

@@ -84,7 +84,9 @@ def fit_curves(
 def _polished(
     fits: list[_LoopFit], guides: list[GuideLine], options: CurveOptions
 ) -> tuple[list[_LoopFit], tuple[str, ...]]:
-    """All loops but full circles with their relations made exact."""
+    """All loops but full circles with their relations made exact, if they are to be."""
+    if not options.use_relations:
+        return fits, ()
     chains = [i for i, fit in enumerate(fits) if fit.fit is not None]
     better, relations = polish([fits[i].fit for i in chains], [fits[i].samples for i in chains], guides, options)
     swapped = dict(zip(chains, better, strict=True))

@@ -40,6 +40,8 @@ class CurveOptions:
         freedom it takes away.
     max_candidates : int
         Bound on the nodes that dynamic programming chooses from.
+    use_relations : bool
+        Whether relations that the data supports are made exact.
     """
 
     correlation_length: float = 5.0
@@ -53,6 +55,7 @@ class CurveOptions:
     bump_depth: float = 5.0
     relation_rise: float = 6.6
     max_candidates: int = 72
+    use_relations: bool = True
 
     def __post_init__(self) -> None:
         for name in ("correlation_length", "complexity", "shortest_edge", "snap_sigmas", "max_candidates"):
