@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from build123d import Edge, Face, Plane, Shell, Solid, Vector, Wire
+from build123d import Edge, Face, Location, Plane, Shell, Solid, Vector, Wire
 from OCP.BRep import BRep_Tool
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge
 from OCP.GeomConvert import GeomConvert
 
-__all__ = ["Sheet", "arc", "behind", "bezier", "board", "circle", "line", "on", "squared", "stretched"]
+__all__ = [
+    "Sheet", "arc", "behind", "bezier", "board", "circle", "largest", "line", "off", "on", "squared", "stretched",
+]  # fmt: skip
 
 
 # --- begin ---
@@ -112,9 +114,23 @@ def board(sheet, size, drawn, outline, holes=(), lies_on=(), bevels=()) -> Solid
         solid = solid.cut(Solid(Shell([Face(ring) for ring in rings]))).solid()
     solid = solid.moved(place.location)
     for plane in lies_on:
-        pieces = solid.cut(behind(squared(plane, sheet), sheet.origin, 2 * sum(size))).solids()
-        solid = max(pieces, key=lambda piece: piece.volume)
+        solid = largest(solid.cut(behind(squared(plane, sheet), sheet.origin, 2 * sum(size))))
     return solid.clean()
+
+
+def largest(cut) -> Solid:
+    return max(cut.solids(), key=lambda piece: piece.volume)
+
+
+def off(solid, other, sheet, gap) -> Solid:
+    """The board as it is, unless it runs into the other: then without what that fills, and the gap round it."""
+    rest = solid.cut(other)
+    if solid.volume - rest.volume < 0.1:  # mm3, rounding
+        return solid
+    ways = [axis * step for axis in (sheet.x, sheet.y, sheet.normal) for step in (gap, -gap)] if gap else []
+    for way in ways:
+        rest = largest(rest).cut(other.moved(Location(way)))
+    return largest(rest).clean()
 
 
 # --- end ---

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from kerfwright.errors import ExportError
 from kerfwright.model import Arc, Bezier, Board, Circle, Contact, Edge, Loop, Model
 from kerfwright.model.frames import board_from_model, model_from_board, transform_points, transform_vectors
-from kerfwright.model.io import write_bytes
 from kerfwright.solid.bevels import bevel_bodies, polyhedron_faces
 from kerfwright.solid.faces import plane_axes
 from kerfwright_exporters.naming import STAMP, ascii_labels, ascii_name, board_colours, plain_name, title
 from kerfwright_exporters.options import ExportOptions
-from kerfwright_exporters.script import identifiers, number
+from kerfwright_exporters.program import exact, identifiers, number, point, write_program
 
 __all__ = ["export"]
 
@@ -79,11 +77,7 @@ def export(model: Model, out_dir: Path, options: ExportOptions) -> list[Path]:
     ExportError
         If the model has no boards.
     """
-    path = Path(out_dir) / "model_cadquery.py"
-    if not model.boards:
-        raise ExportError(f"{path}: boards: none: a program needs at least one board")
-    write_bytes(path, ("\n".join(_program(model, options)) + "\n").encode("utf-8"))
-    return [path]
+    return write_program(model, Path(out_dir) / "model_cadquery.py", _program(model, options))
 
 
 def _program(model: Model, options: ExportOptions) -> Iterator[str]:
@@ -127,7 +121,7 @@ def _function(board: Board, name: str) -> Iterator[str]:
     yield "    bevels = ["
     for body in bevel_bodies(board):
         yield "        ["
-        yield from (f"            [{', '.join(_point(p) for p in face)}]," for face in polyhedron_faces(body))
+        yield from (f"            [{', '.join(point(p) for p in face)}]," for face in polyhedron_faces(body))
         yield "        ],"
     yield "    ]"
     yield f"    return board({number(board.thickness.value)}, outline, holes, bevels)"
@@ -139,26 +133,18 @@ def _loop(loop: Loop) -> str:
 
 def _segment(edge: Edge) -> str:
     if isinstance(edge, Circle):
-        return f'("circle", {_point(edge.centre)}, {number(edge.radius)})'
+        return f'("circle", {point(edge.centre)}, {number(edge.radius)})'
     points = [edge.start, edge.end]
     if isinstance(edge, Arc):
         points.insert(1, edge.mid)
     elif isinstance(edge, Bezier):
         points[1:1] = [edge.control_1, edge.control_2]
-    return f'("{edge.kind}", {", ".join(_point(p) for p in points)})'
-
-
-def _point(values: Iterable[float]) -> str:
-    return "(" + ", ".join(number(v) for v in values) + ")"
-
-
-def _exact(values: Iterable[float]) -> str:
-    return "(" + ", ".join(repr(round(float(v), 15) + 0.0) for v in values) + ")"
+    return f'("{edge.kind}", {", ".join(point(p) for p in points)})'
 
 
 def _place(board: Board) -> str:
     pose = model_from_board(board)
-    return f"place({_point(pose[:3, 3])}, {_exact(pose[:3, 0])}, {_exact(pose[:3, 2])})"
+    return f"place({point(pose[:3, 3])}, {exact(pose[:3, 0])}, {exact(pose[:3, 2])})"
 
 
 def _touch(contact: Contact, boards: dict[str, tuple[Board, str]]) -> Iterator[str]:
@@ -169,7 +155,7 @@ def _touch(contact: Contact, boards: dict[str, tuple[Board, str]]) -> Iterator[s
     for name, outward in ((contact.a, normal), (contact.b, -normal)):
         pose = board_from_model(boards[name][0])
         vectors = (transform_vectors(pose, v) for v in (outward, along))
-        sides.append(f"({_point(transform_points(pose, contact.point))}, {', '.join(map(_exact, vectors))})")
+        sides.append(f"({point(transform_points(pose, contact.point))}, {', '.join(map(exact, vectors))})")
     yield "    touch("
     yield f'        found, "{boards[contact.a][1]}", "{boards[contact.b][1]}",'
     yield from (f"        {side}," for side in sides)

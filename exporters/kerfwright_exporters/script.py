@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import keyword
-import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 
-from kerfwright.errors import ExportError
 from kerfwright.model import Arc, Bezier, Circle, Edge, Loop, Model
-from kerfwright.model.io import write_bytes
+from kerfwright_exporters.clearance import close_pairs
 from kerfwright_exporters.design import BoardDesign, NeighbourCut, design_boards, model_box
-from kerfwright_exporters.naming import STAMP, ascii_labels, ascii_name, file_stems, plain_name, title
+from kerfwright_exporters.naming import STAMP, ascii_labels, ascii_name, plain_name, title
 from kerfwright_exporters.options import ExportOptions
+from kerfwright_exporters.program import exact, identifiers, number, point, write_program
 
-__all__ = ["export", "identifiers", "number"]
+__all__ = ["export"]
 
 
 def export(model: Model, out_dir: Path, options: ExportOptions) -> list[Path]:
@@ -28,11 +26,7 @@ def export(model: Model, out_dir: Path, options: ExportOptions) -> list[Path]:
     ExportError
         If the model has no boards.
     """
-    path = Path(out_dir) / "model_build123d.py"
-    if not model.boards:
-        raise ExportError(f"{path}: boards: none: a program needs at least one board")
-    write_bytes(path, ("\n".join(_program(model, options)) + "\n").encode("utf-8"))
-    return [path]
+    return write_program(model, Path(out_dir) / "model_build123d.py", _program(model, options))
 
 
 def _program(model: Model, options: ExportOptions) -> Iterator[str]:
@@ -48,6 +42,7 @@ def _program(model: Model, options: ExportOptions) -> Iterator[str]:
     yield from _sheets(designs, names, _stocks(model))
     for design, name in zip(designs, names, strict=True):
         yield from _function(design, name, names)
+    yield from _close(model, names)
     yield from _assembly(model, names)
 
 
@@ -57,58 +52,12 @@ def _library() -> str:
     body = source.split("# --- begin ---\n", 1)[1].split("# --- end ---", 1)[0].rstrip()
     head = (
         "from dataclasses import dataclass\n\n"
-        "from build123d import Compound, Edge, Face, Plane, Shell, Solid, Vector, Wire, export_step\n"
+        "from build123d import Compound, Edge, Face, Location, Plane, Shell, Solid, Vector, Wire, export_step\n"
         "from OCP.BRep import BRep_Tool\n"
         "from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge\n"
         "from OCP.GeomConvert import GeomConvert\n\n\n"
     )
     return head + body
-
-
-def identifiers(model: Model) -> list[str]:
-    """A Python name for every board, no two the same."""
-    names: list[str] = []
-    for stem in file_stems(model):
-        name = re.sub(r"\W+", "_", stem).strip("_").lower() or "board"
-        name = f"board_{name}" if not name[0].isalpha() or keyword.iskeyword(name) or name in _TAKEN else name
-        count = 2
-        while name in names:
-            name, count = f"{name.rstrip('0123456789')}{count}", count + 1
-        names.append(name)
-    return names
-
-
-_TAKEN = frozenset(
-    (
-        "arc",
-        "assembly",
-        "behind",
-        "bezier",
-        "board",
-        "circle",
-        "dataclass",
-        "line",
-        "on",
-        "squared",
-        "stretched",
-        "wire",
-    )
-)
-
-
-def number(value: float) -> str:
-    """To a millionth of a micrometre, without trailing zeros."""
-    text = f"{value:.9f}".rstrip("0").rstrip(".")
-    return "0" if text in ("-0", "") else text
-
-
-def _point(values: Iterable[float]) -> str:
-    return "(" + ", ".join(number(v) for v in values) + ")"
-
-
-def _exact(values: Iterable[float]) -> str:
-    """A direction: all its digits, those of rounding taken off."""
-    return "(" + ", ".join(repr(round(float(v), 15) + 0.0) for v in values) + ")"
 
 
 def _stocks(model: Model) -> dict[float, str]:
@@ -128,25 +77,25 @@ def _dimensions(model: Model, designs: list[BoardDesign], names: list[str]) -> I
         yield f"{label} = {number(value)}"
     yield "# Stock"
     yield from (f"{name} = {number(value)}" for value, name in _stocks(model).items())
-    yield "\nDRAWN = " + _point(size) + "  # the size that the numbers below were taken at: leave it"
+    yield "\nDRAWN = " + point(size) + "  # the size that the numbers below were taken at: leave it"
     yield "FACTORS = tuple(a / b for a, b in zip((WIDTH, DEPTH, HEIGHT), DRAWN))"
     yield "\n# Boards, along their own x and y axes; give a number to free one from the object's size"
     for design, name in zip(designs, names, strict=True):
         for label, value, axis in (("LENGTH", design.size[0], design.x), ("WIDTH", design.size[1], design.y)):
-            yield f"{name.upper()}_{label} = {number(value)} * stretched({_exact(axis)}, FACTORS).length"
+            yield f"{name.upper()}_{label} = {number(value)} * stretched({exact(axis)}, FACTORS).length"
 
 
 def _sheets(designs: list[BoardDesign], names: list[str], stocks: dict[float, str]) -> Iterator[str]:
     """Where every board's sheet lies; boards only ever rest on earlier ones."""
     yield "\n\n# Where the boards' sheets lie"
     for k, design in enumerate(designs):
-        place = f"stretched({_point(design.origin)}, FACTORS)"
+        place = f"stretched({point(design.origin)}, FACTORS)"
         if design.rests_on:
             place = f"on({names[design.rests_on.board].upper()}.{design.rests_on.face}, {place})"
         yield f"{names[k].upper()} = Sheet("
         yield f"    origin={place},"
-        yield f"    x=stretched({_exact(design.x)}, FACTORS).normalized(),"
-        yield f"    y=stretched({_exact(design.y)}, FACTORS).normalized(),"
+        yield f"    x=stretched({exact(design.x)}, FACTORS).normalized(),"
+        yield f"    y=stretched({exact(design.y)}, FACTORS).normalized(),"
         yield f"    thickness={stocks[design.board.thickness.value]},"
         yield f"    below={number(design.below)},"
         yield ")"
@@ -165,7 +114,7 @@ def _function(design: BoardDesign, name: str, names: list[str]) -> Iterator[str]
     yield "    ]"
     yield from _bodies(design)
     bevels = ", bevels" if design.bodies else ""
-    yield f"    return board({constant}, (length, width), {_point(design.size)}, outline, holes, lies_on{bevels})"
+    yield f"    return board({constant}, (length, width), {point(design.size)}, outline, holes, lies_on{bevels})"
 
 
 def _bodies(design: BoardDesign) -> Iterator[str]:
@@ -175,7 +124,7 @@ def _bodies(design: BoardDesign) -> Iterator[str]:
     yield "    bevels = ["
     for body in design.bodies:
         yield "        ["
-        yield from (f"            [{', '.join(_point(p) for p in face)}]," for face in body)
+        yield from (f"            [{', '.join(point(p) for p in face)}]," for face in body)
         yield "        ],"
     yield "    ]"
 
@@ -184,8 +133,8 @@ def _cut(cut: object, names: list[str]) -> str:
     if isinstance(cut, NeighbourCut):
         return f"{names[cut.board].upper()}.{cut.face}"
     # a plane stretched by factors: its normal is stretched by their reciprocals
-    normal = f"stretched({_exact(cut.normal)}, [1 / f for f in FACTORS])"
-    return f"Plane(stretched({_point(cut.point)}, FACTORS), z_dir={normal})"
+    normal = f"stretched({exact(cut.normal)}, [1 / f for f in FACTORS])"
+    return f"Plane(stretched({point(cut.point)}, FACTORS), z_dir={normal})"
 
 
 def _loop(loop: Loop) -> str:
@@ -193,17 +142,28 @@ def _loop(loop: Loop) -> str:
     first = loop.edges[0]
     start = first.centre if isinstance(first, Circle) else first.start
     indent = "\n        "
-    return f"({_point(start)}, [{indent}" + f",{indent}".join(_segment(edge) for edge in loop.edges) + ",\n    ])"
+    return f"({point(start)}, [{indent}" + f",{indent}".join(_segment(edge) for edge in loop.edges) + ",\n    ])"
 
 
 def _segment(edge: Edge) -> str:
     if isinstance(edge, Circle):
-        return f"circle({_point(edge.centre)}, {number(edge.radius)})"
+        return f"circle({point(edge.centre)}, {number(edge.radius)})"
     if isinstance(edge, Arc):
-        return f"arc({_point(edge.mid)}, {_point(edge.end)})"
+        return f"arc({point(edge.mid)}, {point(edge.end)})"
     if isinstance(edge, Bezier):
-        return f"bezier({_point(edge.control_1)}, {_point(edge.control_2)}, {_point(edge.end)})"
+        return f"bezier({point(edge.control_1)}, {point(edge.control_2)}, {point(edge.end)})"
     return f"line({number(edge.end[0])}, {number(edge.end[1])})"
+
+
+def _close(model: Model, names: list[str]) -> Iterator[str]:
+    labels = ascii_labels(model)
+    yield "\n\n# Boards near each other. Should two meet after a change, the first is cut back to the second;"
+    yield "# the gap that is left between those that do not touch stands last"
+    yield "CLOSE = ["
+    for pair in close_pairs(model):
+        stays = names[pair.stays].upper()
+        yield f'    ("{labels[pair.gives_way]}", "{labels[pair.stays]}", {stays}, {number(pair.gap)}),'
+    yield "]"
 
 
 def _assembly(model: Model, names: list[str]) -> Iterator[str]:
@@ -213,6 +173,8 @@ def _assembly(model: Model, names: list[str]) -> Iterator[str]:
     for label, name in zip(ascii_labels(model), names, strict=True):
         yield f'        "{label}": {name}(),'
     yield "    }"
+    yield "    for first, second, sheet, gap in CLOSE:"
+    yield "        boards[first] = off(boards[first], boards[second], sheet, gap)"
     yield "    for name, solid in boards.items():"
     yield "        solid.label = name"
     yield f'    return Compound(label="{ascii_name(model.name)}", children=list(boards.values()))'

@@ -10,7 +10,8 @@ from kerfwright.errors import ExportError
 from kerfwright.model import Arc, Line, Loop, Model
 from kerfwright.solid import assembly_solids
 from kerfwright_exporters import ExportOptions
-from kerfwright_exporters.script import export, identifiers
+from kerfwright_exporters.program import identifiers
+from kerfwright_exporters.script import export
 from scripted import dimensions, interference, problems, run, typed_contacts
 from simple import bevel, board, placed, rectangle, stool
 from truths import AVAILABLE, truth_model
@@ -63,6 +64,17 @@ def test_what_lies_on_a_contact_follows_its_neighbour(tmp_path):
     assert interference(solids) == 0
 
 
+def test_boards_that_only_come_near_each_other_do_not_meet_after_a_change(tmp_path):
+    shelf = board(rectangle(200, 100), "shelf", 18.0, placed(at=(18.5, 0, 100)))  # half a millimetre from the side
+    side = board(rectangle(100, 300), "side", 18.0, placed((0, 1, 0), (0, 0, 1)))
+    model = Model(boards=(side, shelf))
+    source = program(model, tmp_path)
+    assert_same(run(source)[0], model)
+    solids, normals = run(source, STOCK_18=20.0)
+    assert interference(solids) == 0 and typed_contacts(solids, normals) == {}
+    assert pytest.approx(20.1) == solids["shelf"].bounding_box().min.X
+
+
 def test_bevels_that_no_whole_plane_can_cut_are_cut_where_they_are(tmp_path):
     angle = [(0, 0), (300, 0), (300, 100), (100, 100), (100, 300), (0, 300)]
     inner = bevel((300, 100), (100, 100), 30.0, 18.0)  # its plane runs through the other leg
@@ -110,9 +122,9 @@ def test_it_runs_by_itself_without_kerfwright(tmp_path):
 
 
 def test_names_become_identifiers():
-    names = ["line", "2nd shelf", "class", "Leg", "leg_", "a.b"]
+    names = ["line", "2nd shelf", "class", "Leg", "leg_", "a.b", "Width"]
     found = identifiers(Model(boards=tuple(board(rectangle(50, 40), n) for n in names)))
-    assert found == ["board_line", "board_2nd_shelf", "board_class", "leg", "leg2", "a_b"]
+    assert found == ["board_line", "board_2nd_shelf", "board_class", "leg", "leg2", "a_b", "board_width"]
     assert all(n.isidentifier() for n in found)
 
 

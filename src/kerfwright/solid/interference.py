@@ -14,7 +14,7 @@ import numpy as np
 from kerfwright.errors import ModelError
 from kerfwright.solid.faces import Shape
 
-__all__ = ["common_volume", "near_pairs", "penetration"]
+__all__ = ["common_volume", "near_pairs", "penetration", "separation"]
 
 
 def near_pairs(shapes: list[Shape], reach: float) -> Iterator[tuple[Shape, Shape]]:
@@ -27,6 +27,11 @@ def near_pairs(shapes: list[Shape], reach: float) -> Iterator[tuple[Shape, Shape
 def penetration(a: Shape, b: Shape) -> float:
     """How deep the boards reach into each other at most, mm: the least over all flat faces; 0 if one parts them."""
     return max(0.0, min(_depth(a, b), _depth(b, a)))
+
+
+def separation(a: Shape, b: Shape) -> float:
+    """How far apart the boards are at least, mm: the most that a flat face's plane tells; 0 if none parts them."""
+    return max(0.0, -min(_depth(a, b), _depth(b, a)))
 
 
 def _depth(a: Shape, b: Shape) -> float:
