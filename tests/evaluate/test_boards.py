@@ -114,3 +114,22 @@ def test_captures_are_found_in_folders_of_them(bench, capture):
     assert list(captures_in([capture.parent])) == [capture]
     with pytest.raises(SystemExit, match="none in it"):
         list(captures_in([capture / "truth"]))
+
+
+def test_identification_is_told_board_by_board(bench):
+    """Glued boards found as one count; a thickness that the cloud does not show is told with its origin."""
+    identify = bench("identify")
+    exact = {
+        "rough_found": 1, "rough_missing": ["b", "c"], "rough_extra": ["board_03"], "rough_as_one": [["a", "b"]],
+        "rough_pairs": {"a": "board_01"}, "rough_thickness_mm": {"a": -0.25}, "selection": {"candidates": 9},
+        "said": {"board_01": {"origin": "inferred", "mm": 11.75, "standard_error": 4.0}},
+    }  # fmt: skip
+    truth = {name: {"points": n, "seen": False} for name, n in (("a", 900), ("b", 400), ("c", 12))}
+    more = exact | {"rough_extra": []}
+    figures = {"cpu_seconds": 3.0, "peak_gib": 0.5, "truth": truth, "exact": exact, "total": [exact, more]}
+    figures["mean"] = [more]
+    page = identify.page({"back": figures, "ball": {"error": "cloud: no plane"}})
+    assert "| back | 2/3 | 1 | 0.25 | - | 9 | 3.0 | 0.50 | 2/3 | 0-1 | 2/3 | 0 |" in page
+    assert "a: thickness not seen; said to be inferred, 11.75 ± 4.00 mm, error -0.25 mm" in page
+    assert "c: not found alone; 12 points in the cloud" in page
+    assert "ball: no figures: cloud: no plane" in page

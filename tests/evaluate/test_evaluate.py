@@ -11,9 +11,13 @@ from kerfwright.capture import write_ply
 from kerfwright.errors import CaptureError, OptionError, OutputError
 from kerfwright.evaluate import evaluate, evaluate_model, read_truth
 from kerfwright.evaluate.nodes import loop_nodes, true_nodes
+from kerfwright.evaluate.rough import rough_figures
 from kerfwright.evaluate.surfaces import Body, occupied_share, sample_surface
 from kerfwright.evaluate.touching import touching_pairs
+from kerfwright.model import Model
+from kerfwright.model.frames import rows
 from kerfwright.model.io import write_model
+from kerfwright.model.resize import resized_board
 from kerfwright.synthetic import random_assembly, tiny_assembly, tiny_capture
 from kerfwright.synthetic.carpentry import given, slab
 from kerfwright.synthetic.files import write_frame, write_truth
@@ -124,6 +128,32 @@ def test_listed_contacts_are_scored_where_rough_boards_do_not_touch(tiny):
     assert rough["contacts_typed_right"] == 2
     assert rough["rough_missing"] == rough["rough_extra"] == ["top"]  # 3 mm off is another plane
     assert rough["rough_thickness_mm"] == {"left": 0.0, "right": 0.0}
+
+
+def test_rough_thickness_is_told_in_the_truths_millimetres(tiny):
+    """Stages work in units of their own; the model's frame tells how long they are."""
+    model = tiny_assembly()
+    factor = 2.5
+    boards = tuple(resized_board(b, np.diag([factor, factor, factor, 1.0])) for b in model.boards)
+    frame = capture_from_model() @ np.diag([1 / factor, 1 / factor, 1 / factor, 1.0])
+    resized = model.model_copy(update={"boards": boards, "capture_from_model": rows(frame)})
+    rough = rough_figures(read_truth(tiny), resized, np.linalg.inv(read_truth(tiny).capture_from_truth) @ frame)
+    assert rough["rough_thickness_mm"] == {"top": 0.0, "left": 0.0, "right": 0.0}
+    assert rough["rough_found"] == 3
+
+
+def test_boards_glued_edge_to_edge_may_be_found_as_one(tmp_path):
+    low, high, far = ((0, 0, 0), (100, 10, 50)), ((0, 0, 50), (100, 10, 100)), ((0, 0, 200), (100, 10, 250))
+    parts = [slab(name, *corners) for name, corners in zip("abc", (low, high, far), strict=True)]
+    truth = read_truth(truth_folder(tmp_path, Model(name="back", boards=parts)))
+    whole = Model(name="back", boards=[slab("one", (0, 0, 0), (100, 10, 100)), parts[2]])
+    frame = np.linalg.inv(truth.capture_from_truth) @ capture_from_model()
+    rough = rough_figures(truth, whole, frame)
+    assert rough["rough_as_one"] == [["a", "b"]]
+    assert rough["rough_missing"] == ["a", "b"]
+    assert rough["rough_extra"] == []
+    apart = Model(name="back", boards=[whole.boards[0], slab("two", (0, 0, 100), (100, 10, 250))])
+    assert rough_figures(truth, apart, frame)["rough_extra"] == ["two"]
 
 
 @pytest.mark.parametrize("family", ["stool", "tilted_stool", "rack", "tray"])

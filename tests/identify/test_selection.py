@@ -2,18 +2,12 @@ import numpy as np
 import pytest
 from shapely.geometry import box
 
-from clouds import box_cloud, pose
+from clouds import box_cloud, candidate, pose
 from kerfwright.identify import IdentifyOptions
 from kerfwright.identify.primitives import look_around
 from kerfwright.identify.selection import Evidence, gather_evidence, select_exact
-from kerfwright.identify.slabs import Slab
-from kerfwright.identify.thickness import ThicknessHypothesis
 
 OPTIONS = IdentifyOptions()
-
-
-def slab(frame, region, thickness, evidence="opposite", free=0.0) -> Slab:
-    return Slab(frame, ThicknessHypothesis(thickness, 0.2, evidence, 1.0), region, (), (), free)
 
 
 def made_evidence(shares: list[float], interior: list[np.ndarray], cost: float = 0.006) -> Evidence:
@@ -37,8 +31,8 @@ def held(self_idx: int, count: int, **others: tuple[int, int]) -> np.ndarray:
 def test_thin_stock_is_preferred():
     """A block of 100 x 60 x 20 is a sheet of 20, not one of 60 stood on its edge."""
     cloud = box_cloud(((0, 0, 0), (100, 60, 20)), spacing=2.0)
-    flat = slab(pose((0, 0, 0)), box(0, 0, 100, 60), 20.0)
-    upright = slab(pose((0, 60, 0), (1, 0, 0), (0, 0, 1)), box(0, 0, 100, 20), 60.0)
+    flat = candidate(pose((0, 0, 0)), box(0, 0, 100, 60), 20.0)
+    upright = candidate(pose((0, 60, 0), (1, 0, 0), (0, 0, 1)), box(0, 0, 100, 20), 60.0)
     assert upright.normal == pytest.approx([0, -1, 0])
     found = select_exact(gather_evidence(cloud, look_around(cloud, OPTIONS), [upright, flat], OPTIONS), OPTIONS)
     assert found.chosen == (1,)
@@ -92,7 +86,7 @@ def test_order_of_the_candidates_does_not_matter():
 
 def test_places_on_sheet_planes_and_cut_faces_are_told_apart():
     cloud = box_cloud(((0, 0, 0), (100, 60, 20)), spacing=2.0)
-    board = slab(pose(), box(0, 0, 100, 60), 20.0)
+    board = candidate(pose(), box(0, 0, 100, 60), 20.0)
     evidence = gather_evidence(cloud, look_around(cloud, OPTIONS), [board], OPTIONS)
     z, n = evidence.places[:, 2], np.abs(evidence.places[:, 2] - 10) > 9
     assert (evidence.by_sheet[0] | evidence.by_cut[0]).mean() > 0.98
@@ -103,6 +97,6 @@ def test_places_on_sheet_planes_and_cut_faces_are_told_apart():
 
 def test_see_through_interior_costs():
     cloud = box_cloud(((0, 0, 0), (100, 60, 20)), spacing=2.0)
-    slabs = [slab(pose(), box(0, 0, 100, 60), 20.0, free=share) for share in (0.0, 0.2)]
+    slabs = [candidate(pose(), box(0, 0, 100, 60), 20.0, free=share) for share in (0.0, 0.2)]
     solid, airy = gather_evidence(cloud, look_around(cloud, OPTIONS), slabs, OPTIONS).cost
     assert airy > solid + 0.1

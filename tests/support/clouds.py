@@ -8,6 +8,8 @@ from shapely.geometry import Polygon, box
 
 from kerfwright.capture.types import Capture, Cloud
 from kerfwright.identify import IdentifyOptions, Sheet, identify
+from kerfwright.identify.slabs import Slab
+from kerfwright.identify.thickness import ThicknessHypothesis
 from kerfwright.model import Quantity, Scale
 from kerfwright.synthetic import DatasetOptions, in_memory, tiny_assembly
 from kerfwright.synthetic.tiny import TINY
@@ -72,6 +74,11 @@ def sheet(name: str, frame: np.ndarray, thickness: float, region: Polygon | tupl
     indices = {"top_idx": none, "bottom_idx": none, "cut_idx": none, "thickness_seen": True} | rest
     region = region if isinstance(region, Polygon) else box(*region)
     return Sheet(name, frame, thickness=quantity, region=region, **indices)
+
+
+def candidate(frame: np.ndarray, region: Polygon, thickness: float, evidence="opposite", free=0.0) -> Slab:
+    """A candidate board that selection may choose."""
+    return Slab(frame, ThicknessHypothesis(thickness, 0.2, evidence, 1.0), region, (), (), free)
 
 
 @lru_cache(maxsize=1)

@@ -18,7 +18,7 @@ from kerfwright.model import Model
 from kerfwright.solid import assembly_solids
 from kerfwright.synthetic.meshes import mesh_in_model
 
-__all__ = ["evaluate", "evaluate_model"]
+__all__ = ["boards_in_cloud", "evaluate", "evaluate_model"]
 
 HIDDEN = 50  # cloud points below which nobody could have seen the board
 TESSELLATION = 0.2  # mm and radians, of curved faces
@@ -170,11 +170,16 @@ def _solid_figures(solids: list, truth_from_model: np.ndarray) -> dict[str, obje
     }
 
 
-def _seen_figures(truth: Truth, overlap, match, want, touches, boards: dict[str, dict]) -> dict[str, object]:
-    """Counts without boards that nobody could have seen, and the overlap of those whose thickness shows."""
+def boards_in_cloud(truth: Truth) -> tuple[list[int], list[bool]]:
+    """Per true board: the cloud points on it, and whether they show its thickness."""
     largest = max(np.ptp(np.concatenate([b.vertices for b in truth.boards]), axis=0))
     own = truth.cloud[Body(*(b.mesh for b in truth.boards)).distance(truth.cloud) < NEAR_SHARE * largest]
-    counts, shown = shown_boards(truth.boards, own)
+    return shown_boards(truth.boards, own)
+
+
+def _seen_figures(truth: Truth, overlap, match, want, touches, boards: dict[str, dict]) -> dict[str, object]:
+    """Counts without boards that nobody could have seen, and the overlap of those whose thickness shows."""
+    counts, shown = boards_in_cloud(truth)
     hidden = {k for k, n in enumerate(counts) if n < HIDDEN}
     for i in match:
         boards[truth.boards[i].name]["thickness_seen"] = shown[i]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,12 +12,15 @@ import shapely
 from kerfwright.cache import read_kept
 from kerfwright.errors import OptionError, OutputError
 from kerfwright.model import Board, CutPath, Line, Loop, Model
+from kerfwright.model.frames import rows
 from kerfwright.model.io import read_model
 
 if TYPE_CHECKING:
+    from kerfwright.capture.types import Capture
     from kerfwright.identify.types import Sheet
+    from kerfwright.model import Contact
 
-__all__ = ["STAGES", "stage_model"]
+__all__ = ["STAGES", "rough_model", "stage_model"]
 
 STAGES = ("identify", "assemble", "refine")
 OUTLINE_MM = 0.3  # rough outlines are ragged by several; thousands of edges would only slow their scoring down
@@ -37,10 +41,14 @@ def stage_model(folder: Path, stage: str | None) -> Model:
     if stage not in STAGES:
         raise OptionError(f"stage: {stage}: not known: take one of {', '.join(STAGES)}")
     result, capture = (_kept(folder, name) for name in (stage, "capture"))
-    boards = tuple(sheet_board(sheet) for sheet in result.sheets)
-    pose = tuple(tuple(float(v) for v in row) for row in capture.capture_from_world)
-    contacts = getattr(result, "contacts", ())
-    return Model(name=folder.name, boards=boards, contacts=contacts, capture_from_model=pose)
+    return rough_model(folder.name, result.sheets, capture, getattr(result, "contacts", ()))
+
+
+def rough_model(name: str, sheets: Sequence[Sheet], capture: Capture, contacts: Sequence[Contact] = ()) -> Model:
+    """Rough boards as a model in the working units of the stages."""
+    boards = tuple(sheet_board(sheet) for sheet in sheets)
+    pose = rows(capture.capture_from_world)
+    return Model(name=name, boards=boards, contacts=tuple(contacts), capture_from_model=pose)
 
 
 def _kept(folder: Path, stage: str):
@@ -59,7 +67,7 @@ def sheet_board(sheet: Sheet) -> Board:
     path = CutPath(outer=_loop(polygon.exterior), holes=tuple(_loop(ring) for ring in polygon.interiors))
     return Board(
         name=sheet.name,
-        model_from_board=tuple(tuple(float(v) for v in row) for row in sheet.world_from_board),
+        model_from_board=rows(sheet.world_from_board),
         thickness=sheet.thickness,
         cut_path=path,
     )

@@ -2,12 +2,33 @@
 
 from __future__ import annotations
 
-from kerfwright.capture.types import Capture
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from kerfwright.capture.types import Capture, Cloud
 from kerfwright.errors import StageError
 from kerfwright.identify.options import IdentifyOptions
 from kerfwright.identify.types import Parts, Primitive, Sheet
 
-__all__ = ["IdentifyOptions", "Parts", "Primitive", "Sheet", "identify"]
+if TYPE_CHECKING:
+    from kerfwright.identify.primitives import Neighbourhood
+    from kerfwright.identify.selection import Evidence, Selection
+    from kerfwright.identify.slabs import Slab
+
+__all__ = [
+    "Candidates", "IdentifyOptions", "Parts", "Primitive", "Sheet", "choose", "find_candidates", "identify",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """What selection chooses from: planes of a cloud, slabs that may be boards, and what each explains."""
+
+    cloud: Cloud
+    around: Neighbourhood
+    planes: list[Primitive]
+    slabs: list[Slab]
+    evidence: Evidence
 
 
 def identify(capture: Capture, options: IdentifyOptions | None = None) -> Parts:
@@ -15,14 +36,18 @@ def identify(capture: Capture, options: IdentifyOptions | None = None) -> Parts:
 
     Raises StageError when the cloud shows no plane, or no plane that could be a board.
     """
+    options = options or IdentifyOptions()
+    return choose(find_candidates(capture, options), options)
+
+
+def find_candidates(capture: Capture, options: IdentifyOptions) -> Candidates:
+    """The first half of `identify`; raises as it does."""
     from kerfwright.identify.freespace import see_through
     from kerfwright.identify.photo_edges import Photos
     from kerfwright.identify.primitives import find_planes, look_around
-    from kerfwright.identify.selection import gather_evidence, select_exact
-    from kerfwright.identify.sheets import join_across, to_sheet
+    from kerfwright.identify.selection import gather_evidence
     from kerfwright.identify.slabs import candidate_slabs
 
-    options = options or IdentifyOptions()
     cloud = capture.cloud
     around = look_around(cloud, options)
     planes = find_planes(cloud, around, options)
@@ -32,7 +57,15 @@ def identify(capture: Capture, options: IdentifyOptions | None = None) -> Parts:
         raise StageError(
             "cloud: no plane has a thickness that a board could have: photograph the edges of the boards too"
         )
-    selection = select_exact(gather_evidence(cloud, around, slabs, options), options)
+    return Candidates(cloud, around, planes, slabs, gather_evidence(cloud, around, slabs, options))
+
+
+def choose(found: Candidates, options: IdentifyOptions) -> Parts:
+    """The second half of `identify`: the boards among the candidates; raises StageError when there are none."""
+    from kerfwright.identify.sheets import join_across, to_sheet
+
+    cloud, around, slabs = found.cloud, found.around, found.slabs
+    selection = _selected(cloud, slabs, found.evidence, options)
     if not selection.chosen:
         raise StageError("cloud: no set of boards explains it: check that the cloud shows one wooden object, cropped")
     chosen = join_across([slabs[k] for k in selection.chosen], max(4 * around.spacing, cloud.diameter / 60))
@@ -41,9 +74,20 @@ def identify(capture: Capture, options: IdentifyOptions | None = None) -> Parts:
     figures = {
         "candidates": len(slabs), "chosen": len(selection.chosen), "objective": selection.objective,
         "bound": selection.bound, "explained": selection.explained, "method": selection.method,
+        "energy": selection.energy,
     }
     notes = _notes(selection.explained, options.least_explained)
-    return Parts(sheets, tuple(planes), around.noise, around.spacing, notes, figures)
+    return Parts(sheets, tuple(found.planes), around.noise, around.spacing, notes, figures)
+
+
+def _selected(cloud: Cloud, slabs: list[Slab], evidence: Evidence, options: IdentifyOptions) -> Selection:
+    """The candidates that are the boards, by the method that the options name."""
+    from kerfwright.identify.annealing import select_annealing
+    from kerfwright.identify.selection import select_exact
+
+    if options.selection == "annealing":
+        return select_annealing(cloud, slabs, evidence, options)
+    return select_exact(evidence, options)
 
 
 def _notes(explained: float, least: float) -> tuple[str, ...]:

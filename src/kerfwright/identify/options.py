@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from kerfwright.errors import OptionError
+
 __all__ = ["IdentifyOptions"]
+
+SELECTIONS, ENERGIES = ("exact", "annealing"), ("total", "mean")
 
 
 @dataclass(frozen=True)
 class IdentifyOptions:
-    """What identification may be told; one set serves every object."""
+    """What identification may be told; one set serves every object.
+
+    Raises OptionError when an option names no method that there is.
+    """
 
     neighbours: int = 16  # points in a local neighbourhood
     inlier_sigmas: float = 5.0  # a point belongs to a plane within this many standard deviations of the noise
@@ -29,5 +36,14 @@ class IdentifyOptions:
     free_sites: int = 1500  # interior samples of a candidate tested for see-through
     max_free: float = 0.25  # candidates with a larger share of see-through interior are dropped
     least_explained: float = 0.7  # share of the surface; stereo's fringe leaves a good model with .8 or more
+    selection: str = "exact"  # or "annealing", as in the paper, for comparison
     solver_seconds: float = 5.0
+    annealing_energy: str = "total"  # squared distance over all points, as in the paper, or their "mean"
+    annealing_steps: int = 1000  # paper, Part Selection
+    annealing_temperatures: tuple[float, float] = (10.0, 0.1)  # first and last; paper, Part Selection
     seed: int = 0
+
+    def __post_init__(self):
+        for name, known in (("selection", SELECTIONS), ("annealing_energy", ENERGIES)):
+            if getattr(self, name) not in known:
+                raise OptionError(f"{name}: {getattr(self, name)}: not known: take {' or '.join(known)}")

@@ -21,7 +21,7 @@ from kerfwright.identify.options import IdentifyOptions
 from kerfwright.identify.primitives import Neighbourhood
 from kerfwright.identify.slabs import Slab
 
-__all__ = ["Evidence", "Selection", "gather_evidence", "select_exact"]
+__all__ = ["Evidence", "Selection", "explained_share", "gather_evidence", "program_value", "select_exact"]
 
 CUT_SHARE = 0.95  # worth of a place explained by a cut face, against 1 for a sheet plane
 BULKY = 0.5  # extra cost of a board whose cut surface reaches the most the five-times rule allows
@@ -42,16 +42,22 @@ class Evidence:
         """Share of a's volume inside the union of others."""
         return float(self.interior[a][:, others].any(axis=1).mean()) if others and len(self.interior[a]) else 0.0
 
+    def broken(self, chosen: list[int]) -> list[int]:
+        """Those of a set that have more than half of their volume in the union of the others."""
+        return [k for k in chosen if self.overlap(k, [o for o in chosen if o != k]) > 0.5]
+
 
 @dataclass(frozen=True)
 class Selection:
-    """Chosen candidates with the program's objective and proven bound."""
+    """Chosen candidates with the exact program's objective and proven bound; annealing proves none, but has energies.
+    """
 
     chosen: tuple[int, ...]
     objective: float
-    bound: float
+    bound: float | None
     explained: float  # share of the observed surface
     method: str = "exact"
+    energy: dict[str, float] | None = None  # squared distance of cloud and boards in D: total and mean over the points
 
 
 def gather_evidence(cloud: Cloud, around: Neighbourhood, slabs: list[Slab], options: IdentifyOptions) -> Evidence:
@@ -132,14 +138,26 @@ def select_exact(evidence: Evidence, options: IdentifyOptions) -> Selection:
         if answer.x is None:
             raise StageError(f"selection: solver: {answer.message}: report this with the capture")
         chosen = [k for k in range(count) if answer.x[k] > 0.5]
-        broken = [k for k in chosen if evidence.overlap(k, [o for o in chosen if o != k]) > 0.5]
+        broken = evidence.broken(chosen)
         if not broken:
             break
         for k in broken:
             holders = [o for o in chosen if o == k or evidence.interior[k][:, o].any()]
             constraints.append(_at_most(holders, len(holders) - 1, len(value)))
-    explained = float((evidence.by_sheet | evidence.by_cut)[chosen].any(axis=0).mean()) if chosen else 0.0
+    explained = explained_share(evidence, chosen)
     return Selection(tuple(chosen), float(-answer.fun), float(-answer.mip_dual_bound), explained)
+
+
+def explained_share(evidence: Evidence, chosen: list[int]) -> float:
+    """Share of the surface that a set of candidates explains."""
+    return float((evidence.by_sheet | evidence.by_cut)[chosen].any(axis=0).mean()) if chosen else 0.0
+
+
+def program_value(evidence: Evidence, chosen: list[int]) -> float:
+    """The exact program's objective at a set of candidates."""
+    sheet = float(evidence.by_sheet[chosen].any(axis=0).mean()) if chosen else 0.0
+    explained = explained_share(evidence, chosen)
+    return (1 - CUT_SHARE) * sheet + CUT_SHARE * explained - float(evidence.cost[chosen].sum())
 
 
 def _signatures(explained: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
