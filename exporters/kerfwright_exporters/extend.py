@@ -6,6 +6,7 @@ import numpy as np
 
 from kerfwright.model import Arc, Bezier
 from kerfwright.model.geometry import arc_circle
+from kerfwright.model.pieces import polar_form
 
 __all__ = ["extended_edge"]
 
@@ -37,16 +38,8 @@ def _longer_bezier(edge: Bezier, length: float, at_end: bool) -> Bezier:
     speed = 3 * np.hypot(*(controls[3] - controls[2] if at_end else controls[1] - controls[0]))
     more = min(length / max(speed, 1e-9), MOST)
     low, high = (0.0, 1 + more) if at_end else (-more, 1.0)
-    points = [_polar(controls, *arguments) for arguments in
+    points = [polar_form(controls, *arguments) for arguments in
               ((low, low, low), (low, low, high), (low, high, high), (high, high, high))]  # fmt: skip
     points[0 if at_end else 3] = np.array(edge.start if at_end else edge.end)
     names = ("start", "control_1", "control_2", "end")
     return edge.model_copy(update={k: tuple(map(float, p)) for k, p in zip(names, points, strict=True)})
-
-
-def _polar(controls: np.ndarray, *parameters: float) -> np.ndarray:
-    """The cubic's polar form: de Casteljau's steps, each with a parameter of its own."""
-    points = controls
-    for t in parameters:
-        points = (1 - t) * points[:-1] + t * points[1:]
-    return points[0]

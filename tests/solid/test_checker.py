@@ -190,7 +190,7 @@ def test_thirty_boards_are_checked_in_five_seconds():
     ]
     model = Model(boards=(*boards, *uprights[:24]))
     check(model)  # imports
-    start = time.perf_counter()
+    start = time.process_time()
     found = check(model)
-    assert time.perf_counter() - start < 5
+    assert time.process_time() - start < 5
     assert {f.code for f in found} == {"K301"} and len(found) == 48

@@ -8,13 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kerfwright.errors import ModelError
 from kerfwright.solid.faces import Shape
 
-__all__ = ["common_volume", "near_pairs", "penetration", "separation"]
+if TYPE_CHECKING:
+    import build123d
+
+__all__ = ["common_solid", "common_volume", "near_pairs", "penetration", "separation"]
 
 
 def near_pairs(shapes: list[Shape], reach: float) -> Iterator[tuple[Shape, Shape]]:
@@ -48,9 +52,19 @@ def common_volume(a: Shape, b: Shape) -> float:
     ModelError
         If OCCT cannot intersect them.
     """
+    return max(0.0, common_solid(a, b).volume)
+
+
+def common_solid(a: Shape, b: Shape) -> build123d.Compound:
+    """What two solids share: any number of solids.
+
+    Raises
+    ------
+    ModelError
+        If OCCT cannot intersect them.
+    """
+    from build123d import Compound
     from OCP.BRepAlgoAPI import BRepAlgoAPI_Common
-    from OCP.BRepGProp import BRepGProp
-    from OCP.GProp import GProp_GProps
     from OCP.TopTools import TopTools_ListOfShape
 
     arguments, tools = TopTools_ListOfShape(), TopTools_ListOfShape()
@@ -64,6 +78,4 @@ def common_volume(a: Shape, b: Shape) -> float:
     operation.Build()
     if not operation.IsDone():
         raise ModelError(f"boards {a.name!r} and {b.name!r}: OCCT cannot intersect them: look at both for tiny edges")
-    properties = GProp_GProps()
-    BRepGProp.VolumeProperties_s(operation.Shape(), properties)
-    return max(0.0, properties.Mass())
+    return Compound(operation.Shape())
