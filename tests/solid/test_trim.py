@@ -45,6 +45,18 @@ def test_edges_are_put_on_the_sheet_they_end_on():
     assert not [f for f in check(trimmed) if f.code in ("K201", "K202", "K210")]
 
 
+def test_an_edge_that_crosses_the_sheet_is_moved_and_not_bent():
+    """Repeats at slightly different turns: the end of one lies .004 mm in the sheet here, .002 mm off it there."""
+    model = longer_legs(0)
+    top, left, _ = model.boards
+    wedge = board([(0, 0), (380.004, 0), (379.998, 300), (0, 300)]).cut_path
+    model = Model(boards=(top, left.model_copy(update={"cut_path": wedge})), contacts=model.contacts[:1])
+    trimmed = fitted_together(model)
+    assert overlap(trimmed) == pytest.approx(0, abs=1e-6) < overlap(model)
+    assert len(trimmed.boards[1].cut_path.outer.edges) == 4
+    assert trimmed.boards[1].cut_path.outer.edges[1].end == pytest.approx((379.994, 300), abs=1e-6)
+
+
 def test_a_mirror_image_is_trimmed_in_the_mirror():
     """The second leg is turned over about its y axis, and only the first one is too long at the top."""
     model = longer_legs(0.03)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kerfwright.errors import ModelError
-from kerfwright.model import Board, Contact, CutPath, Loop, Model
+from kerfwright.model import Board, Contact, CutPath, Line, Loop, Model
 from kerfwright.model.clip import ConvexArea, clipped_loop
 from kerfwright.model.frames import board_from_model, model_from_board, transform_points
 from kerfwright.model.geometry import edge_points, sample_loop, transform_path
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 __all__ = ["TrimOptions", "fitted_together"]
 
-
 PROBES = np.linspace(0, 1, 129)  # where an edge is asked how deep it runs into a neighbour
+MOST_CUTS = 8  # of a pair: a board seldom runs into another in more places
 
 
 @dataclass(frozen=True)
@@ -65,12 +65,14 @@ def fitted_together(model: Model, options: TrimOptions | None = None) -> Model:
     ending = {frozenset((c.a, c.b)): c for c in model.contacts if c.type in (1, 2)}
     for a, b in near_pairs(list(shapes.values()), 0.0):
         contact = ending.get(frozenset((a.name, b.name)))
-        for name, other in _yielding(shapes[a.name], shapes[b.name], contact):
-            trimmed = _trimmed(boards, shapes[name], shapes[other], contact, options)
-            if trimmed is not None:
-                boards |= trimmed
-                shapes |= dict(_shapes(trimmed.values()))
+        for _ in range(MOST_CUTS):
+            ways = _yielding(shapes[a.name], shapes[b.name], contact)
+            tried = (_trimmed(boards, shapes[name], shapes[other], contact, options) for name, other in ways)
+            trimmed = next((found for found in tried if found is not None), None)
+            if trimmed is None:
                 break
+            boards |= trimmed
+            shapes |= dict(_shapes(trimmed.values()))
     model = model.model_copy(update={"boards": tuple(boards[board.name] for board in model.boards)})
     return model.model_copy(update={"contacts": tuple(_measured(c, options, shapes) for c in model.contacts)})
 
@@ -174,13 +176,34 @@ def _areas(
 ) -> Iterator[ConvexArea]:
     """What to take off the board: all beyond the sheet that it ends on, or only what lies in the other."""
     if contact is not None:
-        normal = np.array(contact.normal)
+        normal, outline = np.array(contact.normal), sample_loop(board.cut_path.outer)
         for face in other.faces:
-            if face.normal @ normal > np.cos(np.radians(options.tilt)):
-                yield from _area(board, [face], sample_loop(board.cut_path.outer), options.end, options)
+            if face.normal @ normal > np.cos(np.radians(options.tilt)) and (line := _line(board, face)):
+                for end in _ends(board, *line, options):
+                    yield from _area(board, [end], outline, options.end, options)
     for piece in shared:
         faces = [face for face in other.faces if any(_same_plane(face, own, options.touch) for own in piece.faces)]
-        yield from _area(board, faces, _flat(board, piece.points), options.deepest, options)
+        lines = [line for face in faces if (line := _line(board, face))]
+        yield from _area(board, lines, _flat(board, piece.points), options.deepest, options)
+
+
+def _ends(
+    board: Board, normal: np.ndarray, offset: float, options: TrimOptions
+) -> Iterator[tuple[np.ndarray, float]]:
+    """New lines for the straight edges that a line runs along: it, or where it crosses the edge, one along the edge."""
+    for edge in board.cut_path.outer.edges:
+        if not isinstance(edge, Line):
+            continue
+        ends = np.array([edge.start, edge.end])
+        depths = offset - ends @ normal
+        if np.abs(depths).max() > options.end or depths.max() <= options.touch / 2:
+            continue
+        if depths.min() >= 0:
+            yield normal, offset
+        else:
+            along = (ends[1] - ends[0]) / np.hypot(*(ends[1] - ends[0]))
+            inward = np.array([-along[1], along[0]])
+            yield inward, float(inward @ ends[0] + depths.max())
 
 
 def _same_plane(a: FlatFace, b: FlatFace, within: float) -> bool:
@@ -194,14 +217,13 @@ def _flat(board: Board, points: np.ndarray) -> np.ndarray:
 
 
 def _area(
-    board: Board, faces: list[FlatFace], around: np.ndarray, deepest: float, options: TrimOptions
+    board: Board, lines: list[tuple[np.ndarray, float]], around: np.ndarray, deepest: float, options: TrimOptions
 ) -> Iterator[ConvexArea]:
-    """The part of a window about some points that lies behind all the faces; none where an outline goes in deeper."""
+    """The part of a window about some points that lies behind all lines; none where an outline goes in deeper."""
     import shapely
 
     low, high = around.min(axis=0) - options.around, around.max(axis=0) + options.around
     window = shapely.box(*low, *high)
-    lines = [line for face in faces if (line := _line(board, face)) is not None]
     span = 2 * float(np.hypot(*(high - low)))
     for normal, offset in lines:
         window = window.intersection(_half_plane(normal, offset, (low + high) / 2, span))
