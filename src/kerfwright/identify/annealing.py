@@ -41,9 +41,8 @@ def surface_distance(slab: Slab, x_in_world: np.ndarray) -> np.ndarray:
     """Distance of (N, 3) places to the slab's surface, (N,) mm."""
     x = slab.to_board(x_in_world)
     flat = shapely.points(x[:, :2])
-    shapely.prepare(rim := slab.region.boundary)
     inside = shapely.contains_xy(slab.region, x[:, 0], x[:, 1])
-    aside = np.where(inside, -1.0, 1.0) * shapely.distance(rim, flat)
+    aside = np.where(inside, -1.0, 1.0) * shapely.distance(slab.region.boundary, flat)
     beyond = np.abs(x[:, 2] - slab.thickness.value / 2) - slab.thickness.value / 2
     deepest = np.maximum(aside, beyond)
     return np.where(deepest < 0, -deepest, np.hypot(np.maximum(aside, 0), np.maximum(beyond, 0)))

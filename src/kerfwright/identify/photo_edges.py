@@ -97,16 +97,16 @@ def _view_curves(
     pixels, _ = view.project(grid.reshape(-1, 3))
     colours = photos.colours(k, np.nan_to_num(pixels, nan=-1.0).reshape(*grid.shape[:2], 2))
     groups = np.split(np.arange(len(own)), np.flatnonzero(np.diff(own // chunk)) + 1)
-    curves = []
-    for group in groups:
-        if len(group) < 0.7 * chunk or not np.isfinite(colours[group]).all():
-            continue
-        profile = colours[group].mean(axis=0)
-        slope = np.linalg.norm(gaussian_filter1d(profile, sigma, axis=0, order=1), axis=1)
-        if shown is not None:
-            slope[minimum_filter1d(shown[group].all(axis=0), 2 * int(2 * sigma) + 1) == 0] = np.nan
-        curves.append((k, slope))
-    return curves
+    whole = np.isfinite(colours).all(axis=(1, 2))
+    groups = [group for group in groups if len(group) >= 0.7 * chunk and whole[group].all()]
+    if not groups:
+        return []
+    profiles = np.stack([colours[group].mean(axis=0) for group in groups])
+    slopes = np.linalg.norm(gaussian_filter1d(profiles, sigma, axis=1, order=1), axis=2)
+    if shown is not None:
+        clear = np.stack([shown[group].all(axis=0) for group in groups])
+        slopes[minimum_filter1d(clear, 2 * int(2 * sigma) + 1, axis=1) == 0] = np.nan
+    return [(k, slope) for slope in slopes]
 
 
 def _combine(slopes: np.ndarray, owners: list[int], offsets: np.ndarray) -> SweepResult:

@@ -18,6 +18,8 @@ from kerfwright.identify.types import Primitive
 
 __all__ = ["Neighbourhood", "find_planes", "look_around", "plane_fit"]
 
+CHUNK = 100_000  # points whose neighbourhoods are in memory at once
+
 
 @dataclass(frozen=True, eq=False)
 class Neighbourhood:
@@ -36,26 +38,35 @@ def look_around(cloud: Cloud, options: IdentifyOptions) -> Neighbourhood:
         raise StageError(
             f"cloud: points: {len(cloud)}: at least {4 * options.neighbours} are needed: check the crop of the cloud"
         )
-    distance, idx = cKDTree(cloud.points).query(cloud.points, k=options.neighbours, workers=-1)
-    normals = _unit(cloud.normals[idx].sum(axis=1))
+    idx, third, normals = _neighbours(cloud, options.neighbours)
     residual = _local_residual(cloud.points, idx)
-    return Neighbourhood(
-        idx.astype(np.int32), normals, residual, float(np.median(residual)), float(np.median(distance[:, 3]))
-    )
+    return Neighbourhood(idx, normals, residual, float(np.median(residual)), float(np.median(third)))
+
+
+def _neighbours(cloud: Cloud, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Indices of the nearest points (N, K) int32, distances to the third (N,), normals averaged over all (N, 3)."""
+    tree, size = cKDTree(cloud.points), len(cloud)
+    idx, third, normals = np.empty((size, count), np.int32), np.empty(size), np.empty((size, 3))
+    for start in range(0, size, CHUNK):
+        part = slice(start, start + CHUNK)
+        distance, nearest = tree.query(cloud.points[part], k=count, workers=-1)
+        idx[part], third[part] = nearest, distance[:, 3]
+        normals[part] = _unit(cloud.normals[nearest].sum(axis=1))
+    return idx, third, normals
 
 
 def _unit(v: np.ndarray) -> np.ndarray:
     return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-12)
 
 
-def _local_residual(points: np.ndarray, idx: np.ndarray, chunk: int = 100_000) -> np.ndarray:
+def _local_residual(points: np.ndarray, idx: np.ndarray) -> np.ndarray:
     """Standard deviation of each neighbourhood across its own plane, (N,) mm."""
     out = np.empty(len(points))
-    for start in range(0, len(points), chunk):
-        x = points[idx[start : start + chunk]]
+    for start in range(0, len(points), CHUNK):
+        x = points[idx[start : start + CHUNK]]
         x = x - x.mean(axis=1, keepdims=True)
         scatter = np.einsum("nki,nkj->nij", x, x) / x.shape[1]
-        out[start : start + chunk] = np.sqrt(np.maximum(np.linalg.eigvalsh(scatter)[:, 0], 0))
+        out[start : start + CHUNK] = np.sqrt(np.maximum(np.linalg.eigvalsh(scatter)[:, 0], 0))
     return out
 
 

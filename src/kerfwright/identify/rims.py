@@ -19,6 +19,9 @@ from kerfwright.identify.primitives import Neighbourhood
 __all__ = ["CutPoints", "Rim", "cut_points", "outline_samples", "trace_rim"]
 
 
+WINDOW_VALUES = 1_000_000  # sorted at once, to bound memory
+
+
 @dataclass(frozen=True, eq=False)
 class Rim:
     """Places along a region's rings, board frame mm, in order along each ring."""
@@ -69,19 +72,20 @@ def cut_points(
     frame: world_from_top, z = 0 on the sheet plane. width: how far off the outline they may lie, mm.
     """
     places, outward, _ = samples
-    x = (cloud.points - frame[:3, 3]) @ frame[:3, :3]
-    low, high = places.min(axis=0) - width, places.max(axis=0) + width
-    keep = (x[:, 2] > -deepest) & (x[:, 2] < width) & ((x[:, :2] > low) & (x[:, :2] < high)).all(axis=1)
-    idx = np.flatnonzero(keep)
+    height = cloud.points @ frame[:3, 2] - frame[:3, 3] @ frame[:3, 2]
+    idx = np.flatnonzero((height > -deepest) & (height < width))  # few of the cloud: the rest is done on them alone
     normal = around.normals[idx] @ frame[:3, :3]
     upright = np.abs(normal[:, 2]) < 0.5
     idx, normal = idx[upright], normal[upright]
-    distance, nearest = cKDTree(places).query(x[idx, :2], distance_upper_bound=width)
-    near = np.isfinite(distance)
-    idx, normal, nearest = idx[near], normal[near], nearest[near]
-    facing = (normal[:, :2] * outward[nearest]).sum(axis=1) > 0.6
-    idx, nearest = idx[facing], nearest[facing]
-    return CutPoints(idx, nearest, ((x[idx, :2] - places[nearest]) * outward[nearest]).sum(axis=1), -x[idx, 2])
+    x = (cloud.points[idx] - frame[:3, 3]) @ frame[:3, :3]
+    low, high = places.min(axis=0) - width, places.max(axis=0) + width
+    distance, nearest = np.full(len(x), np.inf), np.zeros(len(x), int)
+    boxed = np.flatnonzero(((x[:, :2] > low) & (x[:, :2] < high)).all(axis=1))
+    distance[boxed], nearest[boxed] = cKDTree(places).query(x[boxed, :2], distance_upper_bound=width)
+    near = np.flatnonzero(np.isfinite(distance))
+    facing = (normal[near, :2] * outward[nearest[near]]).sum(axis=1) > 0.6
+    idx, x, nearest = idx[near][facing], x[near][facing], nearest[near][facing]
+    return CutPoints(idx, nearest, ((x[:, :2] - places[nearest]) * outward[nearest]).sum(axis=1), -x[:, 2])
 
 
 def trace_rim(
@@ -111,9 +115,25 @@ def _window_medians(
     sample, value = sample[order], value[order]
     start = np.searchsorted(sample, np.arange(size) - window)
     stop = np.searchsorted(sample, np.arange(size) + window, side="right")
+    count = stop - start
     median, spread = np.zeros(size), np.zeros(size)
-    for k in np.flatnonzero(stop > start):
-        own = value[start[k] : stop[k]]
-        median[k] = np.median(own)
-        spread[k] = 1.4826 * np.median(np.abs(own - median[k]))
-    return median, stop - start, spread
+    some = np.flatnonzero(count)
+    for rows in np.array_split(some, max(1, int(count[some].max(initial=0) * len(some) // WINDOW_VALUES))):
+        own = _padded(value, start[rows], count[rows])
+        median[rows] = _row_medians(own, count[rows])
+        spread[rows] = 1.4826 * _row_medians(np.abs(own - median[rows, None]), count[rows])
+    return median, count, spread
+
+
+def _padded(value: np.ndarray, start: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """(R, M) the runs value[start : start + count], filled up with infinity."""
+    at = np.arange(count.max(initial=0))
+    inside = at < count[:, None]
+    return np.where(inside, value[np.where(inside, start[:, None] + at, 0)], np.inf)
+
+
+def _row_medians(padded: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """Median of the first `count` values of every row."""
+    ordered = np.sort(padded, axis=1)
+    rows = np.arange(len(ordered))
+    return (ordered[rows, (count - 1) // 2] + ordered[rows, count // 2]) / 2

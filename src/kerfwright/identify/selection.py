@@ -93,7 +93,8 @@ def _explains(slab: Slab, places: np.ndarray, normals: np.ndarray, tolerance: fl
     sheet[idx] = ((np.abs(z - thickness) < tolerance) & (nz > 0.7)) | ((np.abs(z) < slack) & (nz < -0.7))
     side = idx[np.abs(nz) < 0.8]
     if len(side):
-        rim = shapely.distance(slab.region.boundary, shapely.points(x[side, :2])) < 2.5 * tolerance
+        shapely.prepare(boundary := slab.region.boundary)
+        rim = shapely.dwithin(boundary, shapely.points(x[side, :2]), 2.5 * tolerance)
         cut[side[rim]] = True
     return sheet, cut & ~sheet
 

@@ -135,5 +135,6 @@ def _evidence(
     top = near[(np.abs(z - thickness) < tolerance) & (nz > 0.8)]
     bottom = near[(np.abs(z) < tolerance) & (nz < -0.8)]
     side = near[np.abs(nz) < 0.6]
-    rim = shapely.distance(region.boundary, shapely.points(x[side, :2])) < 2 * tolerance
+    shapely.prepare(boundary := region.boundary)
+    rim = shapely.dwithin(boundary, shapely.points(x[side, :2]), 2 * tolerance)
     return top, bottom, side[rim]
