@@ -107,9 +107,11 @@ def write_capture(assembly: Model, folder: Path | str, options: CaptureOptions |
     return folder
 
 
-def in_memory(assembly: Model, options: CaptureOptions) -> Capture:
-    """The same capture without files: world = model, millimetres; exact poses."""
+def in_memory(assembly: Model, options: CaptureOptions, photographed: bool = True) -> Capture:
+    """The same capture without files: world = model, millimetres; exact poses. Not photographed: a cloud alone."""
     session = _session(assembly, options)
+    if not photographed:
+        return Capture(assembly.name, (), session.cloud(), Scale(millimetres_per_unit=1.0, origin="given"))
     views = tuple(
         MemoryView(f"IMG_{k:04d}.jpg", Path(f"IMG_{k:04d}.jpg"), session.camera, pose, picture)
         for k, (pose, picture) in enumerate(zip(session.poses, session.photographs(), strict=True))
