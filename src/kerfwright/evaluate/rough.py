@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -93,6 +94,15 @@ def _share(true: Sequence[TrueBoard], found: Board, truth_from_model: np.ndarray
 
 
 def _region(true: TrueBoard, pose: np.ndarray) -> shapely.Geometry:
-    """The true board's shadow on the plane of a pose."""
+    """The true board's shadow on its plane, in the frame of a board on the same plane."""
+    if pose is true.truth_from_board:
+        return _shadow(true)
+    m = np.linalg.inv(pose) @ true.truth_from_board
+    return shapely.transform(_shadow(true), lambda p: p @ m[:2, :2].T + m[:2, 3])
+
+
+@lru_cache(maxsize=256)
+def _shadow(true: TrueBoard) -> shapely.Geometry:
+    pose = true.truth_from_board
     flat = ((true.vertices - pose[:3, 3]) @ pose[:3, :3])[:, :2][true.triangles]
     return shapely.union_all(shapely.buffer(shapely.polygons(flat), 1e-3))
