@@ -133,3 +133,25 @@ def test_identification_is_told_board_by_board(bench):
     assert "a: thickness not seen; said to be inferred, 11.75 ± 4.00 mm, error -0.25 mm" in page
     assert "c: not found alone; 12 points in the cloud" in page
     assert "ball: no figures: cloud: no plane" in page
+
+
+def test_growth_of_identification_is_tabled_with_exponents(bench):
+    growth = bench("growth")
+    runs = [
+        {
+            "seconds": dict.fromkeys(growth.PHASES, 1e-5 * n), "points": n, "cpu": 5e-5 * n, "wall": 9.0, "planes": 20,
+            "before_gib": 0.3, "peak_gib": 0.5, "candidates": 7, "boards": 4,
+        }
+        for n in (100_000, 400_000)
+    ]  # fmt: skip
+    page = growth.table("points", (100_000, 400_000), runs)
+    assert "| 100000 | 100000 | 1.00 | 1.00 | 1.00 | 1.00 | 1.00 | 5.0 | 9.0 | 0.50 (0.30) | 20 | 7 | 4 |" in page
+    assert "| growth exponent |  | 1.00 | 1.00 | 1.00 | 1.00 | 1.00 | 1.00 |" in page
+
+
+def test_every_spoilt_cloud_has_as_many_normals_as_points(bench, capture):
+    spoilt, cloud = bench("spoilt"), open_capture(capture).cloud
+    for name, spoil in spoilt.SPOILT.items():
+        changed = spoil(cloud, np.random.default_rng(0))
+        assert changed.points.shape == changed.normals.shape, name
+        assert np.isfinite(changed.points).all(), name

@@ -78,6 +78,12 @@ def test_flipped_normals(table):
     assert_is_table(sheets_of(with_flipped(table, 0.1)))
 
 
+def test_normals_at_random(table):
+    wrong = np.random.default_rng(1).random(len(table)) < 0.1
+    normals = np.where(wrong[:, None], ball(len(table)).normals, table.normals)
+    assert_is_table(sheets_of(Cloud(table.points, normals)))
+
+
 def test_strays_of_five_percent(table):
     rng = np.random.default_rng(4)
     count = len(table) // 20
@@ -100,8 +106,8 @@ def test_parallel_planes_are_boards_where_they_face_apart(board):
     assert [round(s.thickness.value, 1) for s in sheets] == [20.0, 20.0]
 
 
-def ball() -> Cloud:
-    normals = np.random.default_rng(0).standard_normal((20000, 3))
+def ball(count: int = 20000) -> Cloud:
+    normals = np.random.default_rng(0).standard_normal((count, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return Cloud(150 * normals, normals)
 

@@ -13,6 +13,7 @@ from kerfwright.synthetic.assemblies import inside
 from kerfwright.synthetic.cameras import camera_rays, looking_at
 from kerfwright.synthetic.meshes import mesh_in_model
 from kerfwright.synthetic.options import CaptureOptions, CloudOptions, DatasetOptions, ImageOptions
+from kerfwright.synthetic.tiny import TINY
 
 SMALL = CaptureOptions(
     dataset=DatasetOptions(images=4, width=160, height=120, turn=30.0, scale=2.5, shift=(1.0, -2.0, 0.5)),
@@ -29,6 +30,12 @@ def distance_to(model, points):
         v, t = mesh_in_model(board)
         scene.add_triangles(open3d.core.Tensor(v.astype(np.float32)), open3d.core.Tensor(t.astype(np.uint32)))
     return scene.compute_distance(open3d.core.Tensor(points.astype(np.float32))).numpy()
+
+
+def test_a_cloud_alone_is_the_photographed_objects():
+    alone, whole = in_memory(tiny_assembly(), TINY, photographed=False), tiny_capture()
+    assert alone.views == ()
+    assert np.array_equal(alone.cloud.points, whole.cloud.points)
 
 
 def test_tiny_capture_is_whole_and_made_once():
