@@ -9,8 +9,8 @@ from kerfwright.model import Origin, Quantity
 D = 500.0
 
 
-def board(thickness: float, error: float = 0.2, area: float = 1e4, seen: bool = True, at: float = 0.0):
-    quantity = Quantity(value=thickness, standard_error=error)
+def board(thickness: float, error: float = 0.2, area: float = 1e4, seen: bool = True, at: float = 0.0, origin=None):
+    quantity = Quantity(value=thickness, standard_error=error, origin=origin or Origin.MEASURED)
     return sheet("b", pose((0, 0, at)), thickness, (0, 0, area / 100, 100), quantity=quantity, thickness_seen=seen)
 
 
@@ -49,6 +49,12 @@ def test_an_unseen_thickness_becomes_the_one_most_wood_has():
     assert found[3].thickness.value == pytest.approx(18.0)
     assert found[3].thickness.origin is Origin.INFERRED
     assert found[3].thickness.standard_error > 1.0
+
+
+def test_a_twin_is_of_the_stock_that_its_twin_is_of():
+    found = shared(board(12.0), board(12.2), board(18.0, area=9e4), board(12.4, seen=False, origin=Origin.SHARED))
+    assert found[3].thickness.value == found[0].thickness.value
+    assert found[3].thickness.origin is Origin.SHARED
 
 
 def test_an_unseen_thickness_pulls_nothing():

@@ -16,8 +16,8 @@ __all__ = ["share_thickness", "with_thickness"]
 
 
 def share_thickness(sheets: tuple[Sheet, ...], diameter: float, options: AssembleOptions) -> tuple[Sheet, ...]:
-    """Sheets whose thicknesses agree within their uncertainty get their weighted mean; unseen ones take the commonest
-    nearby.
+    """Sheets whose thicknesses agree within their uncertainty get their weighted mean; unseen ones take their twins',
+    or the commonest.
 
     The top sheet plane stays where it is: it was measured, the bottom follows.
     """
@@ -34,12 +34,19 @@ def share_thickness(sheets: tuple[Sheet, ...], diameter: float, options: Assembl
         for k in group:
             out[k] = with_thickness(sheets[k], Quantity(value=mean, standard_error=spread, origin=origin))
     if groups:
-        common = max(groups, key=lambda g: area[g].sum())
-        guess = out[common[0]].thickness.value
+        means = np.array([out[g[0]].thickness.value for g in groups])
+        common = float(means[np.argmax([area[g].sum() for g in groups])])
         for k in np.flatnonzero(~seen):
-            unsure = Quantity(value=guess, standard_error=0.3 * guess, origin=Origin.INFERRED)
-            out[k] = with_thickness(sheets[k], unsure)
+            out[k] = with_thickness(sheets[k], _unseen(sheets[k].thickness, means, common))
     return tuple(out)
+
+
+def _unseen(told: Quantity, means: np.ndarray, common: float) -> Quantity:
+    """The thickness of the stock that a board's twin is of; without a twin, of what most wood is."""
+    if told.origin is not Origin.SHARED:
+        return Quantity(value=common, standard_error=0.3 * common, origin=Origin.INFERRED)
+    nearest = float(means[np.argmin(np.abs(means - told.value))])
+    return Quantity(value=nearest, standard_error=told.standard_error, origin=Origin.SHARED)
 
 
 def _clusters(members: np.ndarray, value: np.ndarray, error: np.ndarray, sigmas: float) -> list[list[int]]:

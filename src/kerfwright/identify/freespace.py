@@ -38,6 +38,14 @@ class FreeSpace:
             total[inside] += depth_map[row[inside], column[inside]] > depth[inside] + self.margin
         return total
 
+    def hidden(self, k: int, x_in_world: np.ndarray) -> np.ndarray:
+        """Whether view k shows a surface clearly in front of each of (N, 3) places, (N,) bool."""
+        pixels, depth = self.views[k].project(x_in_world)
+        row, column, inside = _cells(pixels, self.pixel, self.maps[k].shape)
+        shown = np.full(len(depth), -np.inf)
+        shown[inside] = self.maps[k][row[inside], column[inside]]
+        return np.isfinite(shown) & (shown < depth - self.margin)
+
 
 def _cells(pixels: np.ndarray, pixel: float, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     with np.errstate(invalid="ignore"):

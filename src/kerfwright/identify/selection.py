@@ -19,7 +19,7 @@ from kerfwright.capture.types import Cloud
 from kerfwright.errors import StageError
 from kerfwright.identify.options import IdentifyOptions
 from kerfwright.identify.primitives import Neighbourhood
-from kerfwright.identify.slabs import Slab
+from kerfwright.identify.slabs import UNSEEN, Slab
 
 __all__ = ["Evidence", "Selection", "explained_share", "gather_evidence", "program_value", "select_exact"]
 
@@ -119,7 +119,7 @@ def _held_by(slab: Slab, slabs: list[Slab], count: int = 800) -> np.ndarray:
 
 def _cost(slab: Slab, by_sheet: np.ndarray, options: IdentifyOptions) -> float:
     bulk = BULKY * min(slab.cut_ratio / options.cut_area_ratio, 1.0)
-    unseen = 1.0 if slab.thickness.evidence in ("inferred", "cut") else 0.0
+    unseen = 1.0 if slab.thickness.evidence in UNSEEN else 0.0
     return options.board_cost * (1 + bulk + unseen) + SEEN_THROUGH * slab.free_share * float(by_sheet.mean())
 
 

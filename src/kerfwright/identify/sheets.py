@@ -107,7 +107,7 @@ def to_sheet(name: str, slab: Slab, cloud: Cloud, around: Neighbourhood, options
     region = _polygon(rings, slab.region)
     top, bottom, cut = _evidence(slab, region, cloud, around)
     return Sheet(
-        name, slab.world_from_board, _quantity(slab), slab.thickness.evidence != "inferred", region, top, bottom, cut
+        name, slab.world_from_board, _quantity(slab), slab.thickness.evidence not in ("inferred", "twin"), region, top, bottom, cut
     )
 
 
@@ -119,7 +119,9 @@ def _polygon(rings: list[np.ndarray], rough: Polygon) -> Polygon:
 
 
 def _quantity(slab: Slab) -> Quantity:
-    origin = {"inferred": Origin.INFERRED, "ground": Origin.IMPLIED}.get(slab.thickness.evidence, Origin.MEASURED)
+    origin = {"inferred": Origin.INFERRED, "twin": Origin.SHARED, "ground": Origin.IMPLIED}.get(
+        slab.thickness.evidence, Origin.MEASURED
+    )
     return Quantity(value=slab.thickness.value, standard_error=slab.thickness.standard_error, origin=origin)
 
 

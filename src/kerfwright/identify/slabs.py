@@ -20,11 +20,16 @@ from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.primitives import Neighbourhood
 from kerfwright.identify.regions import Raster, occupancy, polygons
 from kerfwright.identify.rims import trace_rim
-from kerfwright.identify.thickness import ThicknessHypothesis, from_cut_faces, from_opposite, from_photos, sharpened
+from kerfwright.identify.thickness import (
+    ThicknessHypothesis, from_cut_faces, from_opposite, from_photos, reaches_ground, sharpened,
+)
+from kerfwright.identify.told import Known, told_by_others
 from kerfwright.identify.types import Primitive
 
 __all__ = ["Slab", "candidate_slabs", "footprint", "plane_frame"]
 
+
+UNSEEN = ("cut", "twin", "inferred")  # evidence that no photograph and no opposite plane gave
 
 _Seed = tuple[tuple[int, ...], np.ndarray, Polygon]  # coplanar patches, world_from_top frame, region
 
@@ -82,13 +87,13 @@ def candidate_slabs(
     """All candidates that are neither too thick for their region nor seen through, in the order of their planes."""
     scene = _Scene(capture, around, planes, free, options, photos)
     seeds = [seed for number in range(len(planes)) for seed in _seeds(scene, number)]
-    known = [(seed, _hypotheses(scene, seed[1], seed[2])) for seed in seeds]
+    known = told_by_others([_looked_at(scene, seed) for seed in seeds], scene)
     stock = _common(known)
-    found = [slab for seed, hypotheses in known for h in hypotheses for slab in _slabs(scene, *seed, h)]
-    found = [slab for slab in found if slab.thickness.evidence != "cut" or scene.is_broad(slab.region)]
-    for seed, hypotheses in known:
-        if not hypotheses and scene.is_broad(seed[2]):
-            rough = [slab for h in stock for slab in _slabs(scene, *seed, h)]
+    found = [slab for k in known for h in k.hypotheses for slab in _slabs(scene, k.top, k.frame, k.piece, h)]
+    found = [slab for slab in found if slab.thickness.evidence not in UNSEEN or scene.is_broad(slab.region)]
+    for k in known:
+        if not k.hypotheses and scene.is_broad(k.piece):
+            rough = [slab for h in stock for slab in _slabs(scene, k.top, k.frame, k.piece, h)]
             found.extend(piece for slab in rough for piece in _without_others(scene, slab, found))
     return _distinct([*found, *_bars(scene, found)])
 
@@ -148,10 +153,10 @@ def footprint(other: Slab, slab: Slab) -> Polygon:
     return shapely.MultiPoint(crossing).convex_hull if len(crossing) > 2 else Polygon()
 
 
-def _common(known: list[tuple[_Seed, list[ThicknessHypothesis]]], most: int = 2) -> list[ThicknessHypothesis]:
+def _common(known: list[Known], most: int = 2) -> list[ThicknessHypothesis]:
     """The thicknesses that most of the object's sheet area has, for boards that show neither their back nor a cut face.
     """
-    pairs = [(h[0].value, seed[2].area) for seed, h in known if h and h[0].evidence in ("opposite", "photos")]
+    pairs = [(k.best.value, k.piece.area) for k in known if k.best and k.best.evidence in ("opposite", "photos")]
     values, area = np.array(pairs).reshape(-1, 2).T
     found: list[ThicknessHypothesis] = []
     while len(values) and len(found) < most:
@@ -186,6 +191,10 @@ class _Scene:
         """Whether most of a region is as wide as a board of unseen thickness must be: a frame of front edges is not."""
         reach = self.options.min_unseen_side * self.diameter / 2
         return piece.buffer(-reach).buffer(reach).area > 0.5 * piece.area
+
+    @property
+    def thickness_limits(self) -> tuple[float, float]:
+        return self.options.min_thickness * self.diameter, self.options.max_thickness * self.diameter
 
     @property
     def fringe(self) -> float:
@@ -235,9 +244,10 @@ def _seeds(scene: _Scene, number: int) -> list[_Seed]:
     return [(top, frame, piece) for piece in pieces]
 
 
-def _hypotheses(scene: _Scene, frame: np.ndarray, piece: Polygon) -> list[ThicknessHypothesis]:
-    """Thicknesses that opposite planes, photographs, the ground or cut faces support, best evidence first."""
-    low, high = scene.options.min_thickness * scene.diameter, scene.options.max_thickness * scene.diameter
+def _looked_at(scene: _Scene, seed: _Seed) -> Known:
+    """A seed with the thicknesses that opposite planes, photographs, the ground or cut faces support, best first."""
+    top, frame, piece = seed
+    low, high = scene.thickness_limits
     cloud, around = scene.capture.cloud, scene.around
     opposite = from_opposite(frame, piece, scene.planes, cloud.points, (low, high), scene.options.opposite_degrees)
     rim = trace_rim(frame, piece, cloud, around, scene.diameter / 40, spacing=scene.rim_spacing, width=scene.fringe)
@@ -249,8 +259,9 @@ def _hypotheses(scene: _Scene, frame: np.ndarray, piece: Polygon) -> list[Thickn
         found = from_cut_faces(frame, piece, cloud, around, (low, high))
     height = frame[2, 3]
     if frame[2, 2] > 0.999 and low < height < high and not any(h.near(height) for h in found):
-        found.append(ThicknessHypothesis(float(height), 2 * around.noise, "ground", piece.area))
-    return found
+        if reaches_ground(frame, piece, cloud, around, height):
+            found.append(ThicknessHypothesis(float(height), 2 * around.noise, "ground", piece.area))
+    return Known(top, frame, piece, rim, tuple(found))
 
 
 def _slabs(

@@ -15,14 +15,19 @@ from scipy.ndimage import gaussian_filter1d
 from shapely.geometry import MultiPoint, Polygon
 
 from kerfwright.capture.types import Cloud
+from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.photo_edges import Photos, SweepResult, refine_peak, sweep_edge
 from kerfwright.identify.primitives import Neighbourhood
 from kerfwright.identify.rims import Rim, cut_points, outline_samples
 from kerfwright.identify.types import Primitive
 
-__all__ = ["ThicknessHypothesis", "from_cut_faces", "from_opposite", "from_photos", "sharpened"]
+__all__ = [
+    "ThicknessHypothesis", "from_cut_faces", "from_opposite", "from_photos", "reaches_ground",
+    "sharpened",
+]
 
 
+GROUND_SHARE = 0.25  # cut-face points in the lower half of a board on the floor, of those in the upper half
 STEREO_BIAS = 2.0  # standard error of a stereo plane, in units of the noise of its points
 
 
@@ -32,7 +37,7 @@ class ThicknessHypothesis:
 
     value: float
     standard_error: float
-    evidence: str  # "opposite", "photos", "cut", "ground", "ends" or "inferred"
+    evidence: str  # "opposite", "photos", "cut", "ground", "ends", "twin" or "inferred"
     support: float  # mm2 of overlap, edge strength, or share of the outline
 
     def near(self, value: float) -> bool:
@@ -149,11 +154,13 @@ def from_photos(
     most_places: int = 250,
     most_views: int = 10,
     step: float,
+    free: FreeSpace | None = None,
 ) -> list[ThicknessHypothesis]:
     """Depths below the sheet plane at which the photographs show an edge that follows the rim, strongest first.
 
     Only places that cut-face points back are swept, in views that look at the cut face. The sheet plane's own edge at
-    depth zero calibrates the measure: a small offset of the plane cancels in the difference.
+    depth zero calibrates the measure: a small offset of the plane cancels in the difference. free: where other boards
+    hide the cut face is left out; without it they are thought away.
     """
     keep = np.flatnonzero(rim.seen)
     if len(keep) < 20:
@@ -161,12 +168,38 @@ def from_photos(
     keep = keep[:: max(1, len(keep) // most_places)]
     places = np.c_[rim.places[keep], np.zeros(len(keep))] @ frame[:3, :3].T + frame[:3, 3]
     outward = np.c_[rim.outward[keep], np.zeros(len(keep))] @ frame[:3, :3].T
+    normal = frame[:3, 2]
     offsets = np.arange(-4 * limits[0], limits[1], step)
-    visible = _looking_at(photos, places, outward, frame[:3, 2], most_views)
-    sweep = sweep_edge(photos, places, -frame[:3, 2], offsets, visible, smoothing=1.5 * step)
-    if sweep is None:
-        return []
-    return _peaks(sweep, limits)
+    visible = _looking_at(photos, places, outward, normal, most_views)
+    if free is not None:
+        visible = _unhidden(visible, free, places, normal, offsets)
+    sweep = sweep_edge(photos, places, -normal, offsets, visible, smoothing=1.5 * step)
+    return [] if sweep is None else _peaks(sweep, limits)
+
+
+def _unhidden(
+    visible: np.ndarray, free: FreeSpace, places: np.ndarray, normal: np.ndarray, offsets: np.ndarray, every: int = 8
+) -> np.ndarray:
+    """(V, N, T) which views look at a place with nothing in front of it that the cloud knows, tested at some offsets.
+    """
+    tested = np.minimum(np.arange(len(offsets)) // every * every + every // 2, len(offsets) - 1)
+    distinct, back = np.unique(tested, return_inverse=True)
+    grid = places[:, None] - offsets[None, distinct, None] * normal
+    out = np.zeros((*visible.shape, len(offsets)), bool)
+    for k in np.flatnonzero(visible.any(axis=1)):
+        own = np.flatnonzero(visible[k])
+        clear = ~free.hidden(k, grid[own].reshape(-1, 3)).reshape(len(own), len(distinct))
+        out[k, own] = clear[:, back]
+    return out
+
+
+def reaches_ground(
+    frame: np.ndarray, piece: Polygon, cloud: Cloud, around: Neighbourhood, height: float
+) -> bool:
+    """Whether a level board's cut faces go on in the lower half of its height: a shelf near the floor has air there."""
+    depth, _, _ = _cut_columns(frame, piece, cloud, around, height)
+    low, high = ((depth > a * height) & (depth < b * height) for a, b in ((0.5, 0.9), (0.1, 0.5)))
+    return bool(low.sum() > GROUND_SHARE * high.sum())
 
 
 def _looking_at(
