@@ -166,8 +166,10 @@ def _in_working_units(capture: Capture) -> Capture:
     import numpy as np
 
     from kerfwright.capture.frame import moved, similarity
+    from kerfwright.capture.steady import snapped
 
-    return moved(capture, similarity(WORKING_SIZE / capture.cloud.diameter, np.eye(3), np.zeros(3)))
+    working = moved(capture, similarity(WORKING_SIZE / capture.cloud.diameter, np.eye(3), np.zeros(3)))
+    return snapped(working, WORKING_SIZE)
 
 
 def _identify(capture: Capture, options: ReconstructOptions) -> Parts:

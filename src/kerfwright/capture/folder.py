@@ -12,6 +12,7 @@ from kerfwright.capture.normals import normals_or_estimates
 from kerfwright.capture.parsing import capture_error, shown
 from kerfwright.capture.posed import LARGEST_NUMBER, PosedImage
 from kerfwright.capture.readers import find_cameras, find_cloud, read_cloud
+from kerfwright.capture.steady import ordered_views, point_order
 from kerfwright.capture.types import Capture, Cloud, View
 from kerfwright.errors import OptionError
 from kerfwright.model import Scale
@@ -70,7 +71,7 @@ def _check_scale(millimetres_per_unit: float | None) -> None:
 
 
 def _views(folder: Path) -> tuple[tuple[View, ...], tuple[str, ...]]:
-    """Views whose photographs are there, in the order of the camera file, and a note of those that are not."""
+    """Views whose photographs are there, by file, and a note of those that are not."""
     finder = ImageFinder(folder)
     cameras = find_cameras(folder)
     images = cameras.read(lambda name: finder.find(name, cameras.path, cameras.base))
@@ -83,7 +84,7 @@ def _views(folder: Path) -> tuple[tuple[View, ...], tuple[str, ...]]:
     if not views:
         raise capture_error(cameras.path, "images", 0, "no image has a pose: export a model with registered images")
     _check_different(views, cameras.path)
-    return views, _missing_note(missing, len(views))
+    return ordered_views(views), _missing_note(missing, len(views))
 
 
 def _missing_note(missing: list[str], there: int) -> tuple[str, ...]:
@@ -121,8 +122,11 @@ def _cloud(path: Path, views: tuple[View, ...]) -> tuple[Cloud, bool, tuple[str,
     read = read_cloud(path)
     _check_points(read.points, path)
     _check_seen(read.points, views, path)
-    normals, notes = normals_or_estimates(read.points, read.normals, views)
-    return Cloud(read.points, normals, read.colours), read.metres, notes
+    rows = (read.points, read.normals, read.colours)
+    order = point_order(*rows)
+    points, normals, colours = (None if row is None else row[order] for row in rows)
+    normals, notes = normals_or_estimates(points, normals, views)
+    return Cloud(points, normals, colours), read.metres, notes
 
 
 def _check_seen(points: np.ndarray, views: tuple[View, ...], path: Path) -> None:

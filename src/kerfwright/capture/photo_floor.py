@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kerfwright.capture.steady import on_grid
 from kerfwright.capture.types import Cloud, View
 
 __all__ = ["PhotoFloor", "floor_in_photos"]
@@ -32,6 +33,7 @@ LEAST_RISE = 0.15  # of the peak above the least in its range
 TILES = 6  # along each side: parts of the floor whose heights are looked for apart, so that they tell its tilt
 FEWEST_TILES = 5  # with a peak
 FEWEST_PATCHES = 60  # windows of a tile that three views or more see
+STEP = 2.0**-20  # of slopes, and of heights as a share of the object's size: pictures are worked on in single precision
 POINTS = 40_000  # of the cloud; enough to cover the object's shadow
 
 
@@ -119,10 +121,9 @@ def floor_in_photos(views: Sequence[View], cloud: Cloud, lowest: float) -> Photo
     plane = _search(views, greys, cloud, lowest)
     if plane is None:
         return None
-    normal = np.array([*-plane.slope, 1.0]) / np.sqrt(1 + plane.slope @ plane.slope)
-    return PhotoFloor(
-        normal, float(normal @ [*plane.middle, plane.height]), plane.height, plane.slope_error, len(views)
-    )
+    slope, height = on_grid(plane.slope, STEP), lowest + float(on_grid(plane.height - lowest, STEP * cloud.diameter))
+    normal = np.array([*-slope, 1.0]) / np.sqrt(1 + slope @ slope)
+    return PhotoFloor(normal, float(normal @ [*plane.middle, height]), height, plane.slope_error, len(views))
 
 
 def _search(views: Sequence[View], greys: Sequence[np.ndarray], cloud: Cloud, lowest: float) -> _Plane | None:

@@ -65,7 +65,7 @@ def prepare(capture: Capture, options: PrepareOptions | None = None) -> Capture:
     """
     options = options or PrepareOptions()
     capture = _boxed(capture, options.box) if options.box else capture
-    capture, floor = _levelled(capture, options)
+    capture, floor = _levelled(_straight(capture), options)
     if options.crop:
         capture = _cropped(_straight(capture), floor)  # what is a stray must not depend on how the capture is turned
     capture, ground = (capture, floor.offset) if floor else _stood_on_floor(capture, options)

@@ -27,16 +27,22 @@ def dominant_yaw(normals: np.ndarray) -> float | None:
     flat = normals[np.abs(normals[:, 2]) < UPRIGHT]
     if len(flat) == 0:
         return None
-    angle = np.arctan2(flat[:, 1], flat[:, 0]) % (np.pi / 2)
-    counts = np.bincount((angle / (np.pi / 2) * BINS).astype(int) % BINS, minlength=BINS)
+    angle = np.arctan2(flat[:, 1], flat[:, 0])
+    start = float(np.angle(np.exp(4j * angle).mean())) / 4  # bins begin here, so that they turn with the object
+    counts = np.bincount((_quarter(angle - start) / (np.pi / 2) * BINS).astype(int) % BINS, minlength=BINS)
     smooth = (
         counts + (np.roll(counts, 1) + np.roll(counts, -1)) * 2 / 3 + (np.roll(counts, 2) + np.roll(counts, -2)) / 3
     )
-    yaw = (int(smooth.argmax()) + 0.5) / BINS * np.pi / 2
+    yaw = start + (int(smooth.argmax()) + 0.5) / BINS * np.pi / 2
     for window in WINDOWS:
-        away = (angle - yaw + np.pi / 4) % (np.pi / 2) - np.pi / 4
+        away = _quarter(angle - yaw + np.pi / 4) - np.pi / 4
         yaw += float(away[np.abs(away) < window].mean()) if (np.abs(away) < window).any() else 0.0
-    return yaw % (np.pi / 2)
+    return _quarter(yaw)
+
+
+def _quarter(angle):
+    """Angles, radians, in [0, pi/2)."""
+    return angle % (np.pi / 2)
 
 
 def straightened(cloud: Cloud, yaw: float) -> float:
@@ -87,11 +93,16 @@ def _densest(offset: np.ndarray, width: float) -> list[float]:
 def upright_turn(cloud: Cloud) -> np.ndarray:
     """3x3 turn about z: faces along x and y, the longer side along x, the side with more points towards +x."""
     yaw = dominant_yaw(cloud.normals)
-    turn = (
-        np.eye(3)
-        if yaw is None
-        else _about_z(-straightened(cloud.select(slice(None, None, max(1, len(cloud) // POINTS))), yaw))
-    )
+    turn = _set_lengthwise(cloud, np.eye(3) if yaw is None else _about_z(-yaw))
+    if yaw is None:
+        return turn
+    some = cloud.select(slice(None, None, max(1, len(cloud) // POINTS)))
+    set_lengthwise = Cloud(some.points @ turn.T, some.normals @ turn.T)  # layers begin at the same face in every frame
+    return _about_z(-straightened(set_lengthwise, 0.0)) @ turn
+
+
+def _set_lengthwise(cloud: Cloud, turn: np.ndarray) -> np.ndarray:
+    """The turn with quarter turns: the longer side along x, the side with more points towards +x."""
     sides = np.ptp(np.percentile(cloud.points[:, :2] @ turn[:2, :2].T, (0.5, 99.5), axis=0), axis=0)
     if sides[1] > sides[0]:
         turn = _about_z(-np.pi / 2) @ turn

@@ -32,8 +32,8 @@ class Raster:
 
     @classmethod
     def around(cls, xy: np.ndarray, cell: float, margin: int = 4) -> Raster:
-        """Grid that holds (N, 2) points with a margin of cells."""
-        low = xy.min(axis=0) - margin * cell
+        """Grid that holds (N, 2) points with a margin of cells; the outermost lie within cells, not on their edges."""
+        low = xy.min(axis=0) - (margin - 0.5) * cell
         columns, rows = np.ceil((xy.max(axis=0) - low) / cell).astype(int) + margin
         return cls((float(low[0]), float(low[1])), cell, (int(rows), int(columns)))
 
