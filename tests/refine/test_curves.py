@@ -7,9 +7,10 @@ import pytest
 
 from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.errors import OptionError, StageError
-from kerfwright.model import Circle, Line, Origin
+from kerfwright.model import Arc, Circle, CutPath, Line, Loop, Origin
 from kerfwright.model.geometry import edge_tangents
 from kerfwright.refine.curves import CurveOptions, fit_curves, fit_cut_path
+from kerfwright.refine.curves.path import check_path
 from kerfwright.refine.types import BoundaryLoop
 
 NOISE = 0.4
@@ -174,3 +175,12 @@ def test_relations_can_be_left_out():
     assert any(r.startswith("parallel") for r in with_them.relations)
     assert without.relations == ()
     assert without.chi2 < with_them.chi2
+
+
+def test_a_path_with_an_arc_shrunk_to_a_point_is_refused_not_a_crash():
+    """As relations between edges made one of the stool's."""
+    corners = [(0.0, 0.0), (90.0, 0.0), (90.0, 60.0), (90.0, 60.00000000000001)]
+    edges = [Line(start=a, end=b) for a, b in ((corners[0], corners[1]), (corners[1], corners[2]))]
+    edges += [Arc(start=corners[2], mid=corners[2], end=corners[3]), Line(start=corners[3], end=corners[0])]
+    with pytest.raises(StageError, match="collinear"):
+        check_path(CutPath(outer=Loop(edges=tuple(edges))))

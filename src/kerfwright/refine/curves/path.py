@@ -41,7 +41,7 @@ def _edge(
 
 
 def check_path(path: CutPath) -> None:
-    """Refuse a path that crosses itself, or whose holes leave the outer loop.
+    """Refuse a path that crosses itself, whose holes leave the outer loop, or of which an arc is a point.
 
     Raises
     ------
@@ -50,7 +50,10 @@ def check_path(path: CutPath) -> None:
     """
     from shapely import is_valid_reason
 
-    polygon = path_polygon(path, 0.05)
+    try:
+        polygon = path_polygon(path, 0.05)
+    except ValueError as error:  # an edge shrunk to a point, by relations between edges
+        raise StageError(f"cut path: {error}") from error
     if not polygon.is_valid or polygon.area <= 0:
         raise StageError(
             f"cut path: loops: {is_valid_reason(polygon)}: the boundary is too rough or crosses itself there"
