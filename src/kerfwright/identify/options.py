@@ -37,7 +37,7 @@ class IdentifyOptions:
     max_free: float = 0.25  # candidates with a larger share of see-through interior are dropped
     least_explained: float = 0.7  # share of the surface; stereo's fringe leaves a good model with .8 or more
     selection: str = "exact"  # or "annealing", as in the paper, for comparison
-    solver_seconds: float = 5.0
+    solver_nodes: int = 20_000  # of the search tree; a limit in seconds would give other boards on a busy machine
     annealing_energy: str = "total"  # squared distance over all points, as in the paper, or their "mean"
     annealing_steps: int = 1000  # paper, Part Selection
     annealing_temperatures: tuple[float, float] = (10.0, 0.1)  # first and last; paper, Part Selection

@@ -135,7 +135,7 @@ def select_exact(evidence: Evidence, options: IdentifyOptions) -> Selection:
     integrality = np.r_[np.ones(count), np.zeros(len(value) - count)]
     while True:
         answer = milp(-value, integrality=integrality, bounds=Bounds(0, 1), constraints=constraints,
-                      options={"time_limit": options.solver_seconds, "mip_rel_gap": 0})
+                      options={"node_limit": options.solver_nodes, "mip_rel_gap": 0})
         if answer.x is None:
             raise StageError(f"selection: solver: {answer.message}: report this with the capture")
         chosen = [k for k in range(count) if answer.x[k] > 0.5]

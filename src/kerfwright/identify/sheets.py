@@ -106,9 +106,8 @@ def to_sheet(name: str, slab: Slab, cloud: Cloud, around: Neighbourhood, options
     rings = [rim.places[rim.ring == k] for k in range(int(rim.ring.max()) + 1)]
     region = _polygon(rings, slab.region)
     top, bottom, cut = _evidence(slab, region, cloud, around)
-    return Sheet(
-        name, slab.world_from_board, _quantity(slab), slab.thickness.evidence not in ("inferred", "twin"), region, top, bottom, cut
-    )
+    seen = slab.thickness.evidence not in ("inferred", "twin")
+    return Sheet(name, slab.world_from_board, _quantity(slab), seen, region, top, bottom, cut)
 
 
 def _polygon(rings: list[np.ndarray], rough: Polygon) -> Polygon:

@@ -21,7 +21,12 @@ from kerfwright.identify.primitives import Neighbourhood
 from kerfwright.identify.regions import Raster, occupancy, polygons
 from kerfwright.identify.rims import trace_rim
 from kerfwright.identify.thickness import (
-    ThicknessHypothesis, from_cut_faces, from_opposite, from_photos, reaches_ground, sharpened,
+    ThicknessHypothesis,
+    from_cut_faces,
+    from_opposite,
+    from_photos,
+    reaches_ground,
+    sharpened,
 )
 from kerfwright.identify.told import Known, told_by_others
 from kerfwright.identify.types import Primitive
@@ -258,9 +263,9 @@ def _looked_at(scene: _Scene, seed: _Seed) -> Known:
     if not found and not scene.photos.views:
         found = from_cut_faces(frame, piece, cloud, around, (low, high))
     height = frame[2, 3]
-    if frame[2, 2] > 0.999 and low < height < high and not any(h.near(height) for h in found):
-        if reaches_ground(frame, piece, cloud, around, height):
-            found.append(ThicknessHypothesis(float(height), 2 * around.noise, "ground", piece.area))
+    level = frame[2, 2] > 0.999 and low < height < high and not any(h.near(height) for h in found)
+    if level and reaches_ground(frame, piece, cloud, around, height):
+        found.append(ThicknessHypothesis(float(height), 2 * around.noise, "ground", piece.area))
     return Known(top, frame, piece, rim, tuple(found))
 
 
