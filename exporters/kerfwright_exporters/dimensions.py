@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kerfwright.model.geometry import sample_loop
+from kerfwright.model import CutPath
 from kerfwright_exporters.cutlist import length_text
-from kerfwright_exporters.drawing import LETTER_WIDTH
+from kerfwright_exporters.drawing import LETTER_WIDTH, outline_polygon
 from kerfwright_exporters.options import ExportOptions
 
 if TYPE_CHECKING:
@@ -62,15 +62,11 @@ def sheet_dimensions(sheet: Sheet, scale: float, options: ExportOptions) -> Iter
 
 
 def _polygon(board: LaidBoard) -> Polygon:
-    """The board's outline as laid; where sampled arcs cross a neighbour by less than their tolerance, made valid."""
-    import shapely
-    from shapely.geometry import Polygon
-
-    rings = {cut.operation: [] for cut in board.drawing.cuts}
+    """The board's outline as laid."""
+    loops = {"outside": [], "inside": []}
     for cut in board.drawing.cuts:
-        rings[cut.operation].append(sample_loop(cut.loop, 0.1))
-    parts = shapely.get_parts(shapely.make_valid(Polygon(rings["outside"][0], rings.get("inside", []))))
-    return max((part for part in parts if part.geom_type == "Polygon"), key=shapely.area)
+        loops.setdefault(cut.operation, []).append(cut.loop)
+    return outline_polygon(CutPath(outer=loops["outside"][0], holes=tuple(loops["inside"])), 0.1)
 
 
 def _on_board(polygon: Polygon, across: int, height: float, options: ExportOptions) -> Iterator[Dimension]:

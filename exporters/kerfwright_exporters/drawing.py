@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from kerfwright.model import Board, CutPath, Loop
+from kerfwright.errors import ExportError
+from kerfwright.model import Bezier, Board, CutPath, Loop
 from kerfwright.model.arcs import arc_path
 from kerfwright.model.geometry import path_polygon, transform_loop
 from kerfwright_exporters.naming import STAMP, plain_name
@@ -22,8 +23,10 @@ from kerfwright_exporters.relief import relieved_path
 if TYPE_CHECKING:
     from shapely.geometry import Polygon
 
-__all__ = ["BevelLine", "Cut", "Drawing", "Text", "board_drawing", "cutting_path", "moved_drawing"]
+__all__ = ["BevelLine", "Cut", "Drawing", "Text", "board_drawing", "cutting_path", "moved_drawing", "outline_polygon"]
 
+CHORD = 0.01  # mm between an arc and its chords, when it is asked whether arcs cross
+FINER = 10  # halvings of the tolerance of arcs, down to a twentieth of a micrometre
 LETTER_WIDTH = 0.95  # of a letter's height, with the space after it, in the widest of the usual fonts
 TEXT_HEIGHTS = (12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5)  # mm, the largest that fits is taken
 
@@ -78,11 +81,42 @@ def board_drawing(board: Board, options: ExportOptions) -> Drawing:
 
 
 def cutting_path(board: Board, options: ExportOptions) -> CutPath:
-    """The cut path as the files carry it: reliefs as asked for, Beziers as arcs unless splines were asked for."""
-    path = board.cut_path if options.splines else arc_path(board.cut_path, options.arc_tolerance)
+    """The cut path as the files carry it: reliefs as asked for, Beziers as arcs unless splines were asked for.
+
+    Raises
+    ------
+    ExportError
+        If arcs would cross each other at any tolerance, or there is no room for a relief.
+    """
+    path = board.cut_path if options.splines else _as_arcs(board, options.arc_tolerance)
     if options.relief == "none":
         return path
     return relieved_path(path, options.relief, options.tool_diameter, board.name)
+
+
+def _as_arcs(board: Board, tolerance: float) -> CutPath:
+    """The cut path with arcs for Beziers, within less than the tolerance where they would cross in a slit."""
+    if not any(isinstance(e, Bezier) for loop in (board.cut_path.outer, *board.cut_path.holes) for e in loop.edges):
+        return board.cut_path
+    for halvings in range(FINER):
+        path = arc_path(board.cut_path, tolerance / 2**halvings)
+        if path_polygon(path, min(CHORD, tolerance / 2**halvings)).is_valid:
+            return path
+    raise ExportError(
+        f"board {board.name!r}: cut_path: arcs for its curves would cross each other: widen its slits, "
+        "or export with splines"
+    )
+
+
+def outline_polygon(path: CutPath, chord: float = CHORD) -> Polygon:
+    """The path as a polygon, curves within the chord (mm); the largest part, where chords cross a narrow slit."""
+    import shapely
+
+    polygon = path_polygon(path, chord)
+    if polygon.is_valid:
+        return polygon
+    parts = shapely.get_parts(shapely.make_valid(polygon))
+    return max((part for part in parts if part.geom_type == "Polygon"), key=shapely.area)
 
 
 def _tool_path(cut: Cut, distance: float, name: str) -> Cut:
@@ -90,7 +124,7 @@ def _tool_path(cut: Cut, distance: float, name: str) -> Cut:
 
 
 def _texts(board: Board, path: CutPath, bevels: tuple[BevelLine, ...], options: ExportOptions) -> Iterator[Text]:
-    polygon = path_polygon(path, 0.1)
+    polygon = outline_polygon(path, 0.1)
     lines = [plain_name(board.name), *([STAMP] if options.unverified else [])]
     (x, y), size = _room(polygon, lines)
     for row, (operation, text) in enumerate(zip(("label", "stamp"), lines, strict=False)):

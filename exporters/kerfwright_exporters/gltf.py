@@ -95,7 +95,14 @@ def _face(face: build123d.Face) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     normals = np.zeros_like(points)
     for k in range(3):
         np.add.at(normals, triangles[:, k], facets)
-    return points, normals / np.linalg.norm(normals, axis=1, keepdims=True), triangles
+    return points, _unit(normals, facets.sum(axis=0)), triangles
+
+
+def _unit(normals: np.ndarray, usual: np.ndarray) -> np.ndarray:
+    """The directions (N, 3) at length 1; the usual one where there is none: at corners of no triangle but slivers."""
+    usual = usual if usual.any() else np.array([0.0, 0.0, 1.0])
+    found = np.where((np.linalg.norm(normals, axis=1) > 0)[:, None], normals, usual)
+    return found / np.linalg.norm(found, axis=1, keepdims=True)
 
 
 def _add(document: dict[str, Any], buffer: bytearray, data: np.ndarray) -> int:

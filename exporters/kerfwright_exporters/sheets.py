@@ -15,11 +15,10 @@ import numpy as np
 
 from kerfwright.errors import ExportError
 from kerfwright.model import Line, Loop, Model
-from kerfwright.model.geometry import path_polygon
 from kerfwright.model.io import write_bytes
 from kerfwright_exporters.cutlist import length_text
 from kerfwright_exporters.dimensions import OUTSIDE, sheet_dimensions
-from kerfwright_exporters.drawing import Drawing, Text, board_drawing, cutting_path, moved_drawing
+from kerfwright_exporters.drawing import Drawing, Text, board_drawing, cutting_path, moved_drawing, outline_polygon
 from kerfwright_exporters.dxf import add_drawing, dxf_bytes, new_document
 from kerfwright_exporters.layers import layer_colour, layer_name
 from kerfwright_exporters.naming import file_stems, plain_name
@@ -94,7 +93,7 @@ def lay_sheets(model: Model, options: ExportOptions) -> list[Sheet]:
 
 def _sheets_of(model: Model, numbers: list[int], thickness: float, options: ExportOptions) -> list[Sheet]:
     boards, stems = [model.boards[k] for k in numbers], [file_stems(model)[k] for k in numbers]
-    outlines = [path_polygon(cutting_path(board, options)) for board in boards]
+    outlines = [outline_polygon(cutting_path(board, options)) for board in boards]
     places = _nested(outlines, [board.name for board in boards], options)
     laid: dict[int, list[LaidBoard]] = {}
     for board, stem, outline, place in zip(boards, stems, outlines, places, strict=True):

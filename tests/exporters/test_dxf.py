@@ -8,10 +8,12 @@ from ezdxf import path as ezpath
 
 from kerfwright.errors import OptionError
 from kerfwright.model import Arc, Bezier, Line, Loop, Model
-from kerfwright.model.geometry import path_area
+from kerfwright.model.arcs import arc_path
+from kerfwright.model.geometry import path_area, path_polygon
 from kerfwright_exporters import ExportOptions
+from kerfwright_exporters.drawing import cutting_path
 from kerfwright_exporters.dxf import export
-from simple import bevel, board, hole, polygon, rectangle, stool
+from simple import bevel, board, cracked, hole, polygon, rectangle, stool
 from truths import AVAILABLE, truth_model
 
 WAVY = Loop(
@@ -141,3 +143,11 @@ def test_truths_keep_their_areas(name, tmp_path):
     model = truth_model(name)
     for one, path in zip(model.boards, export(model, tmp_path, ExportOptions()), strict=True):
         assert net_area(read(path)) == pytest.approx(path_area(one.cut_path), rel=1e-3)
+
+
+@pytest.mark.parametrize("width", [0.2, 0.03])
+def test_arcs_for_curves_beside_each_other_do_not_cross(width):
+    crack = board(cracked(width))
+    found = path_polygon(cutting_path(crack, ExportOptions()))
+    assert found.is_valid and found.area == pytest.approx(path_area(crack.cut_path), rel=1e-4)
+    assert not path_polygon(arc_path(crack.cut_path, 0.05)).is_valid

@@ -6,11 +6,12 @@ import struct
 import numpy as np
 import pytest
 
+from kerfwright.model import Model
 from kerfwright.solid import assembly_solids
 from kerfwright_exporters import ExportOptions
 from kerfwright_exporters.brep import export as export_brep
 from kerfwright_exporters.gltf import export as export_gltf
-from simple import stool
+from simple import board, cracked, stool
 from truths import AVAILABLE, truth_model
 
 MODELS = {"stool of three": stool, **{name: (lambda name=name: truth_model(name)) for name in AVAILABLE}}
@@ -66,3 +67,9 @@ def test_same_bytes_twice(export, tmp_path):
     (first,), (second,) = (export(stool(), tmp_path / folder, ExportOptions()) for folder in "ab")
     assert first.read_bytes() == second.read_bytes()
     assert len(list((tmp_path / "a").iterdir())) == 1
+
+
+def test_gltf_has_a_normal_where_a_face_has_none(tmp_path):
+    """OCCT's mesh of a cracked face has corners that no triangle uses."""
+    (path,) = export_gltf(Model(boards=(board(cracked(0.03)),)), tmp_path, ExportOptions())
+    assert path.stat().st_size > 1000

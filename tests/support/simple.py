@@ -1,9 +1,12 @@
 """Small models for tests of solids and exporters."""
 
+from itertools import pairwise
+
 import numpy as np
 
-from kerfwright.model import Bevel, Board, Circle, Contact, CutPath, Line, Loop, Model, Quantity
+from kerfwright.model import Bevel, Bezier, Board, Circle, Contact, CutPath, Line, Loop, Model, Quantity
 from kerfwright.model.frames import rows
+from kerfwright.model.geometry import reverse_loop
 
 Points = list[tuple[float, float]]
 
@@ -72,3 +75,12 @@ def stool() -> Model:
         for leg, x in zip(legs, (50.0, 332.0), strict=True)
     )
     return Model(name="stool", boards=(top, *legs), contacts=contacts)
+
+
+def cracked(width: float) -> Loop:
+    """The outline of a board of 200 x 60 mm with a crack of that width between two curves, 45 mm deep, pointed."""
+    near = Bezier(start=(100, 0), control_1=(95, 15), control_2=(115, 30), end=(100, 45))
+    far = Bezier(start=(100, 45), control_1=(115 - width, 30), control_2=(95 - width, 15), end=(100 - width, 0))
+    points = [(100 - width, 0.0), (0.0, 0.0), (0.0, 60.0), (200.0, 60.0), (200.0, 0.0), (100.0, 0.0)]
+    lines = [Line(start=a, end=b) for a, b in pairwise(points)]
+    return reverse_loop(Loop(edges=(near, far, *lines)))
