@@ -12,7 +12,7 @@ from kerfwright.assemble import AssembleOptions
 from kerfwright.assemble.apart import kept_apart
 from kerfwright.assemble.flush import flush_neighbours
 from kerfwright.assemble.gaps import mended
-from kerfwright.assemble.outlines import constrained_region, filled_region
+from kerfwright.assemble.outlines import constrained_region, filled_region, largest_piece
 from kerfwright.assemble.types import Assembly, ConstraintSegment
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.freespace import FreeSpace
@@ -24,6 +24,14 @@ UNDER = ConstraintSegment(np.array([0.0, 0.0]), np.array([100.0, 0.0]), "contact
 
 def test_a_region_is_run_on_to_its_segment():
     assert filled_region(box(0, 40, 100, 90), (UNDER,), 60).area == pytest.approx(9000, rel=1e-3)
+
+
+def test_a_strip_left_as_a_hole_outside_the_shell_is_no_part_of_the_region():
+    """As GEOS 3.14 made it of a small shelf, cut off behind a segment on which its edge nearly lay."""
+    strip = box(10, -25, 90, -1e-8)
+    broken = Polygon(box(0, 0, 100, 50).exterior, [strip.exterior])
+    assert not broken.is_valid
+    assert largest_piece(broken).equals(box(0, 0, 100, 50))
 
 
 def test_it_is_not_run_on_further_than_told():
