@@ -1,5 +1,6 @@
 """The pipeline's own work: order, what it merges, what it keeps of the times."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,11 +8,12 @@ import pytest
 
 from kerfwright import __version__, pipeline
 from kerfwright.capture.types import Capture, Cloud
-from kerfwright.errors import StageError
+from kerfwright.errors import OptionError, StageError
 from kerfwright.identify.types import Parts
 from kerfwright.model import Finding, Scale
 from kerfwright.pipeline import ReconstructOptions, Stage, run_stages
 from kerfwright.progress import Reporter
+from kerfwright.refine import RefineOptions
 
 
 def capture(origin: str = "assumed") -> Capture:
@@ -86,7 +88,7 @@ def test_the_model_says_where_it_lies_and_what_it_came_from():
     assert (origin.points, origin.images) == (5, 0)
     assert origin.options == {
         "up": "z", "millimetres_per_unit": None, "seed": 3, "crop": "auto", "ground": None, "length": "", "markers": "",
-        "scale_by_stock": False, "stock": "",
+        "scale_by_stock": False, "stock": "", "without": "",
     }  # fmt: skip
 
 
@@ -125,3 +127,22 @@ def test_measured_lengths_fix_the_scale_before_thicknesses_are_snapped(monkeypat
     refined, told = refined_with(monkeypatch, ReconstructOptions(stock="36", length="shelf:x=200mm"))
     assert told == [(), pytest.approx((18.0,))]
     assert refined.scale_factor == pytest.approx(2.0)
+
+
+def test_what_an_ablation_leaves_out_reaches_segmentation(monkeypatch):
+    """One photograph a board and no seams, or none at all; other names are told."""
+    from kerfwright.assemble.types import Assembly
+    from kerfwright.refine import alternate
+
+    told = []
+    monkeypatch.setattr(alternate, "segment_boards", lambda *given: told.append(given[3]) or [])
+    monkeypatch.setattr(alternate, "see_through", lambda *_: None)
+    monkeypatch.setattr(alternate, "_split", lambda pieces, *_: told.append("split") or pieces)
+    parts = SimpleNamespace(spacing=1.0, noise=0.1, sheets=())
+    for without in ("multi-view,seams", "segmentation", "constraints"):
+        settings = replace(RefineOptions(), **pipeline.left_out(without))
+        alternate.traced_pieces(Assembly((), (), ()), parts, capture(), settings)
+    assert [(o.max_views, o.use_images) for o in told if o != "split"] == [(1, True), (7, False), (7, True)]
+    assert told[-1] == "split" and told.count("split") == 1
+    with pytest.raises(OptionError, match="glue"):
+        pipeline.left_out("seams,glue")

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from kerfwright import __version__
 from kerfwright.cache import NO_CACHE, StageCache, folder_hash, program_hash
+from kerfwright.errors import OptionError, shown
 from kerfwright.output import OutputFolder
 from kerfwright.progress import Reporter
 
@@ -27,11 +28,22 @@ if TYPE_CHECKING:
     from kerfwright.model import Finding, Model
     from kerfwright.refine import Refined
 
-__all__ = ["STAGES", "ReconstructOptions", "Reconstruction", "Stage", "reconstruct", "run_stages", "stage_cache"]
+__all__ = [
+    "LEFT_OUT", "STAGES", "ReconstructOptions", "Reconstruction", "Stage", "left_out", "reconstruct", "run_stages",
+    "stage_cache",
+]
 
 
 # Units that the object's largest side has inside the stages; their lengths are millimetres at that size.
 WORKING_SIZE = 500.0
+
+# What refinement can do without, to see what it is good for (paper, Ablations): what RefineOptions then says.
+LEFT_OUT: dict[str, dict[str, Any]] = {
+    "segmentation": {"use_images": False},
+    "multi-view": {"views_a_board": 1},
+    "constraints": {"use_constraints": False},
+    "seams": {"use_seams": False},
+}
 
 
 @dataclass(frozen=True)
@@ -49,6 +61,7 @@ class ReconstructOptions:
     markers : markers that give the scale; see `kerfwright.capture.markers.parse_markers`.
     scale_by_stock : take the scale at which most boards are of a stock thickness.
     stock : thicknesses to snap to where the scale is known; see `kerfwright.stock.parse_stock`. Empty: none.
+    without : parts of refinement to leave out, of LEFT_OUT, commas between them: for benchmarks.
     """
 
     up: str = "z"
@@ -60,6 +73,7 @@ class ReconstructOptions:
     markers: str = ""
     scale_by_stock: bool = False
     stock: str = ""
+    without: str = ""
 
 
 @dataclass(frozen=True)
@@ -190,7 +204,7 @@ def _refine(assembly: Assembly, parts: Parts, capture: Capture, options: Reconst
     from kerfwright.refine import RefineOptions, fit_traced, trace
     from kerfwright.stock import scale_is_known
 
-    settings = RefineOptions(seed=options.seed)
+    settings = replace(RefineOptions(seed=options.seed), **left_out(options.without))
     pieces = trace(assembly, parts, capture, settings)
     if not options.stock or not scale_is_known(capture.scale, options.length):
         return fit_traced(pieces, parts, capture, settings)
@@ -199,6 +213,15 @@ def _refine(assembly: Assembly, parts: Parts, capture: Capture, options: Reconst
         factor = _length_factor(_model(fit_traced(pieces, parts, capture, settings), parts, capture, options), options)
     settings = replace(settings, stock=_working_stock(capture, options.stock, factor))
     return replace(fit_traced(pieces, parts, capture, settings), scale_factor=factor)
+
+
+def left_out(without: str) -> dict[str, Any]:
+    """Fields of RefineOptions for what is left out. Raises OptionError for a name that LEFT_OUT has not."""
+    names = [name for name in without.split(",") if name]
+    unknown = [name for name in names if name not in LEFT_OUT]
+    if unknown:
+        raise OptionError(f"--without: {shown(unknown[0])}: not known: take some of {', '.join(LEFT_OUT)}")
+    return {field: value for name in names for field, value in LEFT_OUT[name].items()}
 
 
 def _length_factor(model: Model, options: ReconstructOptions) -> float:

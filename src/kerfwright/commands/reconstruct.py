@@ -13,7 +13,7 @@ import typer
 from kerfwright.cli import guarded
 from kerfwright.errors import OptionError
 from kerfwright.output import OutputFolder
-from kerfwright.pipeline import ReconstructOptions
+from kerfwright.pipeline import ReconstructOptions, left_out
 from kerfwright.progress import Reporter, reporter_for
 from kerfwright.supervise import supervised
 
@@ -70,6 +70,7 @@ Seed = Annotated[int, typer.Option("--seed", min=0, help="Of the random generato
 Jobs = Annotated[
     int | None, typer.Option("-j", "--jobs", min=1, help="Cores to use; all if not said. The results are the same.")
 ]
+Without = Annotated[str, typer.Option("--without", metavar="PARTS", hidden=True)]  # for benchmarks
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing but errors.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Progress as one JSON object a line, on standard output.")]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more.")]
@@ -87,6 +88,7 @@ def reconstruct(
     ground: Ground = None,
     seed: Seed = 0,
     jobs: Jobs = None,
+    without: Without = "",
     quiet: Quiet = False,
     as_json: AsJson = False,
     verbose: Verbose = False,
@@ -96,7 +98,7 @@ def reconstruct(
     options = ReconstructOptions(
         up=checked_axis(up), millimetres_per_unit=checked_scale(scale), seed=seed, crop=checked_crop(crop),
         ground=ground, length=_checked_lengths(length or []), markers=_checked_markers(markers),
-        scale_by_stock=scale == AUTO, stock=_checked_stock(stock),
+        scale_by_stock=scale == AUTO, stock=_checked_stock(stock), without=_checked_without(without),
     )  # fmt: skip
     _limit_threads(jobs)
     reporter = reporter_for(sys.stdout if as_json else sys.stderr, quiet=quiet, as_json=as_json, verbose=verbose)
@@ -210,6 +212,11 @@ def _checked_stock(stock: str) -> str:
 
         parse_stock(stock)
     return stock
+
+
+def _checked_without(without: str) -> str:
+    left_out(without)
+    return without
 
 
 def _check_one_scale(scale: str | None, lengths: Sequence[str] | None, markers: str) -> None:

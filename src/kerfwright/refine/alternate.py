@@ -46,7 +46,7 @@ def traced_pieces(
     diameter = capture.cloud.diameter
     assembly = assembly if options.use_constraints else _unconstrained(assembly)
     free = see_through(capture, parts.spacing, max(5 * parts.noise, diameter / 150))
-    segmenting = SegmentOptions(use_images=options.use_images)
+    segmenting = SegmentOptions(use_images=options.use_images, max_views=options.views_a_board)
     found = segment_boards(assembly.sheets, assembly.constraints, capture, segmenting, free)
     pieces = []
     for sheet, segments, board in zip(assembly.sheets, assembly.constraints, found, strict=True):
@@ -54,7 +54,7 @@ def traced_pieces(
             region = constrained_region(outline_region(outline), segments, diameter / 6, diameter / 20)
             own = replace(sheet, region=region)
             pieces.append(Piece(_with_own_points(own, capture) if len(board.outlines) > 1 else own, outline))
-    if options.use_images:
+    if options.use_images and options.use_seams:
         pieces = _split(pieces, assembly, capture)
     return tuple(replace(p, sheet=replace(p.sheet, name=f"board_{k + 1:02d}")) for k, p in enumerate(pieces))
 

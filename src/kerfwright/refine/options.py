@@ -16,6 +16,8 @@ class RefineOptions:
 
     use_images: bool = True  # false: cut paths come from the cloud alone
     use_constraints: bool = True  # false: cut paths follow what was traced, neither contacts nor relations of edges
+    use_seams: bool = True  # false: boards glued edge to edge stay one
+    views_a_board: int = 7  # photographs (paper, Joint Image-Based Segmentation)
     boundary_step: float = 1 / 450  # spacing of boundary points handed to curve fitting
     stock: Stock = field(default_factory=Stock)  # thicknesses to snap to, in the stages' units
     seed: int = 0
