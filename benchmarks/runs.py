@@ -17,13 +17,14 @@ COMMAND = (sys.executable, "-m", "kerfwright", "reconstruct")
 
 @dataclass(frozen=True)
 class Run:
-    """One run: exit code, wall seconds, seconds a stage, peak memory in GiB, last line said."""
+    """One run: exit code, wall seconds, also a stage, peak memory in GiB, last line said, seconds of all cores a stage."""
 
     code: int
     seconds: float
     stages: dict[str, float] = field(default_factory=dict)
     peak_gib: float | None = None
     last_line: str = ""
+    cpu: dict[str, float] = field(default_factory=dict)
 
 
 def captures_in(paths: Sequence[Path]) -> Iterator[Path]:
@@ -51,5 +52,5 @@ def _read(out: Path, code: int, seconds: float, last_line: str) -> Run:
     if not path.exists():
         return Run(code, seconds, last_line=last_line)
     record = json.loads(path.read_text())
-    stages = record["seconds"]
-    return Run(code, seconds or sum(stages.values()), stages, record["peak_memory_gib"], last_line)
+    stages, cpu = record["seconds"], record.get("cpu_seconds", {})
+    return Run(code, seconds or sum(stages.values()), stages, record["peak_memory_gib"], last_line, cpu)

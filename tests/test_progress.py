@@ -27,6 +27,7 @@ def test_times_are_kept_of_finished_stages_only():
     reporter = Reporter()
     run(reporter)
     assert list(reporter.seconds) == ["one", "two"] and all(0 <= s < 1 for s in reporter.seconds.values())
+    assert list(reporter.cpu_seconds) == ["one", "two"] and all(0 <= s < 1 for s in reporter.cpu_seconds.values())
     assert reporter.reused == ["two"]
 
 

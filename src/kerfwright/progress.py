@@ -17,11 +17,13 @@ class Reporter:
     Attributes
     ----------
     seconds : wall-clock seconds a finished stage took, in the order of the stages.
+    cpu_seconds : of all cores together; unlike wall-clock seconds they tell little of what else the machine did.
     reused : names of the stages whose results came from the cache.
     """
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
+        self.cpu_seconds: dict[str, float] = {}
         self.reused: list[str] = []
         self._shares: dict[str, float] = {}
 
@@ -41,7 +43,7 @@ class Reporter:
     @contextmanager
     def stage(self, name: str, text: str = "") -> Iterator[None]:
         """Time what happens inside; a stage that raises has no time."""
-        start = time.perf_counter()
+        start, cpu_start = time.perf_counter(), time.process_time()
         self._started(name, text or name)
         try:
             yield
@@ -49,6 +51,7 @@ class Reporter:
             self._failed(name)
             raise
         self.seconds[name] = time.perf_counter() - start
+        self.cpu_seconds[name] = time.process_time() - cpu_start
         self._finished(name, text or name, self.seconds[name])
 
     def reuse(self, name: str) -> None:

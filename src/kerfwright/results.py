@@ -76,6 +76,7 @@ def write_run(reporter: Reporter, path: Path) -> None:
     """Write times, peak memory and versions."""
     run = {
         "seconds": {name: round(seconds, 3) for name, seconds in reporter.seconds.items()},
+        "cpu_seconds": {name: round(seconds, 3) for name, seconds in reporter.cpu_seconds.items()},
         "cached": reporter.reused,
         "peak_memory_gib": round(_peak_memory_gib(), 3),
         "kerfwright": __version__, "python": platform.python_version(), "system": platform.platform(),
