@@ -25,7 +25,9 @@ def constraint_segments(
     traces = _pointed(sheets, decided)
     for number, d in enumerate(decided):
         out[d.joint.b] += _segments(traces[number], d.joint.intervals, "contact", number)
-        if d.kind == 2:
+        if d.kind == 4:
+            out[d.joint.a] += _segments(d.other.trace, d.other.intervals, "contact", number)
+        elif d.kind == 2:
             trace = _outer_trace(sheets, d)
             if trace is not None:
                 out[d.joint.a] += _segments(trace, d.other.intervals, "corner", number)

@@ -1,15 +1,17 @@
-"""All contacts of an assembly: who ends on whom (paper, Connections and Disambiguating Corners; types 1 and 2)."""
+"""All contacts of an assembly: who ends on whom (paper, Connections and Disambiguating Corners; types 1, 2 and mitres).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
 from kerfwright.assemble.joints import Joint, Search, end_on, face_plane
+from kerfwright.assemble.mitres import EndFace, corner_lines, look_for_mitre, mitred, overlapping
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.assemble.seams import End, Seam, look_for_end, look_for_seam
 from kerfwright.assemble.visibility import Obstacles
@@ -26,16 +28,22 @@ AS_CLEAR = 0.8  # of the score of the edge at the plane
 LEAST_VIEWS = 3  # photographs that must show an edge for it to decide anything
 MOST_SPOILT = 0.3  # of a gap may be seen through, or taken by another board
 CLEAR_MARGIN = 1.25  # ratio of seam scores from which a corner counts as decided by the photographs
+LEAST_MITRE = 1.7  # strength of a mitre's seam on an end face; butt joints show up to 1.6 there
+MITRE_MARGIN = 1.3  # ... over the seams of butt joints
+MITRE_VIEWS = 6  # an end face is small: fewer photographs of it say nothing
 
 
 @dataclass(frozen=True, eq=False)
 class Decided:
-    """A contact as decided: b ends on a; for a corner also the joint that was not chosen."""
+    """A contact as decided: b ends on a; for a corner also the joint that was not chosen; for a mitre both joints,
+    on its plane.
+    """
 
     joint: Joint
-    kind: int  # contact type, 1 or 2
+    kind: int  # contact type, 1, 2 or 4
     other: Joint | None
     evidence: ContactEvidence
+    mitre: EndFace | None = None  # what end faces show of a corner that may be a mitre
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +80,7 @@ def find_contacts(
     earlier : what was found before the regions were run on; its corners stay as they are, for they were decided when
         less was known that could hide their seams.
     """
-    settled = {frozenset((d.joint.a, d.joint.b)): d for d in earlier if d.kind == 2}
+    settled = {frozenset((d.joint.a, d.joint.b)): d for d in earlier if d.kind in (2, 4)}
     scene = _Scene(sheets, cloud, photos, Obstacles(sheets, options.outline_error * cloud.diameter), free, options)
     near, far, doubtful = _all_joints(scene)
     found: list[Decided] = []
@@ -221,7 +229,8 @@ def _corner(scene: _Scene, first: Joint, second: Joint, before: Decided | None) 
     """Which of two boards stops: the one whose outer face shows the seam."""
     if before is not None:
         joints = (first, second) if before.joint.b == first.b else (second, first)
-        return Decided(joints[0], 2, joints[1], before.evidence)
+        joints = mitred(scene.sheets, *joints) if before.kind == 4 else joints
+        return replace(before, joint=joints[0], other=joints[1])
     seams = [_seam(scene, j, _outer_face(scene, j)) for j in (first, second)]
     chosen = 0 if seams[0].score >= seams[1].score else 1
     margin = seams[chosen].score / max(seams[1 - chosen].score, 1e-6)
@@ -230,7 +239,37 @@ def _corner(scene: _Scene, first: Joint, second: Joint, before: Decided | None) 
         decided_by="seam" if margin >= CLEAR_MARGIN and seams[chosen].score >= LEAST_SEAM else "default",
     )
     joints = (first, second)
-    return Decided(joints[chosen], 2, joints[1 - chosen], evidence)
+    corner = Decided(joints[chosen], 2, joints[1 - chosen], evidence, _end_face(scene, first, second, seams))
+    return _mitre(scene, corner, "seam") if _shows_mitre(corner) else corner
+
+
+def _end_face(scene: _Scene, first: Joint, second: Joint, seams: list[Seam]) -> EndFace | None:
+    """What the end faces show of a corner that may be a mitre: both boards reach its outer line, and both outer faces
+    were seen without the seam of a butt joint.
+    """
+    bare = all(seam.views >= LEAST_VIEWS and seam.score < LEAST_SEAM for seam in seams)
+    if not bare or not overlapping(scene.sheets, first, second):
+        return None
+    flush = scene.mm(scene.options.outline_error)
+    return look_for_mitre(scene.sheets, first, second, scene.photos, scene.obstacles, scene.diameter, flush)
+
+
+def _shows_mitre(corner: Decided) -> bool:
+    face = corner.mitre
+    if face is None or face.views < MITRE_VIEWS:
+        return False
+    return face.mitre >= LEAST_MITRE and face.mitre >= MITRE_MARGIN * face.butt
+
+
+def _mitre(scene: _Scene, corner: Decided, decided_by: str) -> Decided:
+    """The corner as a mitre, with the score of its seam and the best one of a butt joint."""
+    face = corner.mitre
+    evidence = ContactEvidence(
+        seam_score=face.mitre, seam_score_other=max(face.butt, corner.evidence.seam_score), views=face.views,
+        decided_by=decided_by,
+    )
+    joint, other = mitred(scene.sheets, corner.joint, corner.other)
+    return Decided(joint, 4, other, evidence, face)
 
 
 def _outer_face(scene: _Scene, joint: Joint) -> str:
@@ -247,15 +286,22 @@ def _middle(sheet: Sheet) -> np.ndarray:
 
 def _like_their_twins(scene: _Scene, found: list[Decided]) -> list[Decided]:
     """Corners that the photographs leave open are decided as the corners between boards of the same sizes are."""
-    clear = [d.joint for d in found if d.kind == 1 or d.evidence.decided_by == "seam"]
+    clear = [d.joint for d in found if d.kind == 1 or (d.kind == 2 and d.evidence.decided_by == "seam")]
+    mitres = [d for d in found if d.kind == 4]
     out = []
     for d in found:
         if d.kind == 2 and d.evidence.decided_by == "default":
-            votes = sum(_alike(scene, d.joint, c) - _alike(scene, d.other, c) for c in clear)
-            if votes < 0:
-                d = Decided(d.other, 2, d.joint, _swapped(d.evidence))
+            votes = [sum(_alike(scene, j, c) for c in clear) for j in (d.joint, d.other)]
+            if d.mitre is not None and sum(_alike_either_way(scene, d, m) for m in mitres) > max(votes):
+                d = _mitre(scene, d, "default")
+            elif votes[0] < votes[1]:
+                d = replace(d, joint=d.other, other=d.joint, evidence=_swapped(d.evidence))
         out.append(d)
     return out
+
+
+def _alike_either_way(scene: _Scene, one: Decided, other: Decided) -> bool:
+    return any(_alike(scene, one.joint, joint) for joint in (other.joint, other.other))
 
 
 def _swapped(e: ContactEvidence) -> ContactEvidence:
@@ -282,18 +328,22 @@ def _sides(sheet: Sheet) -> np.ndarray:
 
 def to_contact(decided: Decided, sheets: tuple[Sheet, ...]) -> Contact:
     """The model's contact with its interface as rectangles on the plane: each as wide as board b's cut face."""
-    joint = decided.joint
+    joint, is_mitre = decided.joint, decided.kind == 4
     a, b = sheets[joint.a], sheets[joint.b]
-    normal, offset = face_plane(a, joint.face_a)
+    normal, offset = _mitre_plane(decided, sheets) if is_mitre else face_plane(a, joint.face_a)
     polygons = tuple(_rectangle(joint, b, interval) for interval in joint.intervals)
-    width = b.thickness.value / joint.trace.sine
-    angle = float(np.degrees(np.arcsin(min(joint.trace.sine, 1.0))))
+    angle = float(np.degrees(np.arccos(min(abs(a.normal @ b.normal), 1.0))))
     return Contact(
-        type=decided.kind, a=a.name, b=b.name, face_a=joint.face_a, face_b="edge",
+        type=decided.kind, a=a.name, b=b.name, face_a="edge" if is_mitre else joint.face_a, face_b="edge",
         point=_point(normal * offset), normal=_point(normal), interface=polygons,
-        area=joint.length * width, angle=angle,
+        area=joint.length * b.thickness.value / joint.trace.sine, angle=angle,
         bevelled=abs(joint.trace.slope) > 1e-3, evidence=decided.evidence,
     )
+
+
+def _mitre_plane(decided: Decided, sheets: tuple[Sheet, ...]) -> tuple[np.ndarray, float]:
+    lines = corner_lines(sheets, decided.joint, decided.other)
+    return lines.normal, float(lines.normal @ lines.inner)
 
 
 def _rectangle(joint: Joint, b: Sheet, interval: tuple[float, float]) -> tuple:

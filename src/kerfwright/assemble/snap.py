@@ -13,6 +13,7 @@ import numpy as np
 
 from kerfwright.assemble.contacts import Decided
 from kerfwright.assemble.joints import Joint, face_plane, trace_of
+from kerfwright.assemble.mitres import mitred
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.assemble.stock import with_thickness
 from kerfwright.errors import StageError
@@ -68,10 +69,13 @@ def _snapped(sheet: Sheet, size: float, keep_bottom: bool) -> Sheet:
 
 def moved_with(sheets: tuple[Sheet, ...], decided: Sequence[Decided]) -> list[Decided]:
     """The same contacts on sheets that were moved along their normals, or made thicker or thinner, since."""
-    return [
-        replace(d, joint=_moved(sheets, d.joint), other=None if d.other is None else _moved(sheets, d.other))
-        for d in decided
-    ]
+    return [replace(d, joint=joint, other=other) for d in decided for joint, other in [_moved_pair(sheets, d)]]
+
+
+def _moved_pair(sheets: tuple[Sheet, ...], d: Decided) -> tuple[Joint, Joint | None]:
+    if d.kind == 4:
+        return mitred(sheets, d.joint, d.other)
+    return _moved(sheets, d.joint), None if d.other is None else _moved(sheets, d.other)
 
 
 def _moved(sheets: tuple[Sheet, ...], joint: Joint) -> Joint:

@@ -12,6 +12,7 @@ from shapely.geometry import Polygon
 from kerfwright.assemble import AssembleOptions, assemble
 from kerfwright.assemble.apart import kept_apart
 from kerfwright.assemble.outlines import constrained_region
+from kerfwright.assemble.rings import find_ring_seams, split_ring
 from kerfwright.assemble.splits import SeamLine, find_seam_lines, seam_contact, seam_segments, split_sheet
 from kerfwright.assemble.types import Assembly
 from kerfwright.assemble.visibility import Obstacles
@@ -32,11 +33,12 @@ EXACT = AssembleOptions(rough=False, outline_error=1 / 200, reach=1 / 60)
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A board after the photographs, the outline it came from, and the seam to the piece before it."""
+    """A board after the photographs, the outline it came from, and the seam to the piece `before` places before it."""
 
     sheet: Sheet
     outline: Outline
     seam: SeamLine | None = None
+    before: int = 1
 
 
 def traced_pieces(
@@ -99,6 +101,10 @@ def _split(pieces: list[Piece], assembly: Assembly, capture: Capture) -> list[Pi
     obstacles = Obstacles([p.sheet for p in pieces], diameter / 100)
     out: list[Piece] = []
     for piece in pieces:
+        ring = _ring_boards(piece, photos, obstacles, capture)
+        if ring:
+            out += ring
+            continue
         touching = _touching(piece.sheet.name, assembly)
         seams = find_seam_lines(piece.sheet, touching, photos, obstacles, diameter)
         if not seams:
@@ -107,6 +113,17 @@ def _split(pieces: list[Piece], assembly: Assembly, capture: Capture) -> list[Pi
         sheets = split_sheet(piece.sheet, seams, capture.cloud.points)
         out += [Piece(s, piece.outline, seam) for s, seam in zip(sheets, [None, *seams], strict=True)]
     return out
+
+
+def _ring_boards(piece: Piece, photos: Photos, obstacles: Obstacles, capture: Capture) -> list[Piece]:
+    """The boards of a frame that was found as one ring; the first one's seam leads to the last."""
+    diameter = capture.cloud.diameter
+    seams = find_ring_seams(piece.sheet, photos, obstacles, diameter)
+    sheets = split_ring(piece.sheet, seams, capture.cloud.points, diameter) if seams else []
+    return [
+        Piece(own, piece.outline, seam, 1 if k else 1 - len(sheets))
+        for k, (own, seam) in enumerate(zip(sheets, seams, strict=False))
+    ]
 
 
 def _touching(name: str, assembly: Assembly) -> list[Sheet]:
@@ -122,9 +139,10 @@ def _with_seams(assembly: Assembly, pieces: Sequence[Piece]) -> Assembly:
         if piece.seam is None:
             continue
         touching = piece.seam.gap == 0
+        other = k - piece.before
         before, after = seam_segments(piece.seam, len(contacts) if touching else None)
-        constraints[k - 1].append(before)
+        constraints[other].append(before)
         constraints[k].append(after)
         if touching:
-            contacts.append(seam_contact(assembly.sheets[k - 1], assembly.sheets[k], piece.seam))
+            contacts.append(seam_contact(assembly.sheets[other], assembly.sheets[k], piece.seam))
     return replace(assembly, contacts=tuple(contacts), constraints=tuple(tuple(c) for c in constraints))
