@@ -1,9 +1,11 @@
 """Corners of two upright boards, 100 mm high and 15 mm thick, seen from above: mitred, butted, square and skewed."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from shapely.geometry import box
 
 from clouds import box_cloud, cloud_only, pose, sheet
 from kerfwright.assemble import AssembleOptions, contacts
@@ -84,7 +86,14 @@ def test_the_end_face_shows_a_butt_joint(first_runs_through):
 def test_boards_that_do_not_end_flush_have_no_end_face():
     first, second = corner()
     shorter = sheet("second", second.world_from_board, T, (0, 20, 200, 80))
-    assert end_face(lambda x, y: x * 0, (first, shorter)) is None
+    assert end_face(lambda x, y: x * 0, (first, shorter)).views == 0
+
+
+def test_where_a_board_ends_is_read_beside_the_corner_even_where_its_joint_is_ragged():
+    first, second = corner()
+    ragged = second.region.difference(box(-5, 85, 4, 110))
+    face = end_face(lambda x, y: np.where(y > x, 150.0, 165.0), (first, replace(second, region=ragged)))
+    assert (face.views, face.mitre > 2) == (8, True)
 
 
 def test_only_boards_that_both_reach_the_outer_corner_may_be_mitred():
@@ -95,6 +104,7 @@ def test_only_boards_that_both_reach_the_outer_corner_may_be_mitred():
 
 
 MITRE, BUTT, FAINT = EndFace(2.2, 1.1, 12), EndFace(1.1, 3.0, 12), EndFace(1.4, 1.2, 12)
+NOTHING = EndFace(0.0, 0.0, 0)
 
 
 def decided(monkeypatch, face, outer=1.1, views=8, sheets=None):
@@ -123,7 +133,7 @@ def test_a_mitre_is_cut_on_cut_and_bevels_both_boards(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("face", "outer", "views"), [(MITRE, 3.0, 8), (MITRE, 1.1, 2), (BUTT, 1.1, 8), (FAINT, 1.1, 8), (None, 1.1, 8),
+    ("face", "outer", "views"), [(MITRE, 3.0, 8), (MITRE, 1.1, 2), (BUTT, 1.1, 8), (FAINT, 1.1, 8), (NOTHING, 1.1, 8),
                                  (EndFace(3.0, 1.0, 3), 1.1, 8)]
 )  # fmt: skip
 def test_without_clear_evidence_a_corner_is_a_butt_joint(monkeypatch, face, outer, views):
@@ -131,12 +141,13 @@ def test_without_clear_evidence_a_corner_is_a_butt_joint(monkeypatch, face, oute
     assert found.kind == 2
 
 
-def test_a_faint_corner_follows_a_clear_mitre_between_boards_of_the_same_sizes(monkeypatch):
+@pytest.mark.parametrize("face", [FAINT, NOTHING])
+def test_an_open_corner_follows_a_clear_mitre_between_boards_of_the_same_sizes(monkeypatch, face):
     first, second = corner()
     far = second.world_from_board.copy()
     far[:3, 3] += (200 - T, 0, 0)
     sheets = (first, second, sheet("third", far, T, second.region))
-    both = decided(monkeypatch, [MITRE, FAINT], sheets=sheets)
+    both = decided(monkeypatch, [MITRE, face], sheets=sheets)
     assert [d.kind for d in both] == [4, 4]
     assert [d.evidence.decided_by for d in both] == ["seam", "default"]
 

@@ -27,6 +27,7 @@ LEAST_SEAM = 1.35  # a visible seam is at least this much stronger than the face
 AS_CLEAR = 0.8  # of the score of the edge at the plane
 LEAST_VIEWS = 3  # photographs that must show an edge for it to decide anything
 MOST_SPOILT = 0.3  # of a gap may be seen through, or taken by another board
+LEAST_SHARE = 0.25  # of the length of a corner's other joint
 CLEAR_MARGIN = 1.25  # ratio of seam scores from which a corner counts as decided by the photographs
 LEAST_MITRE = 1.7  # strength of a mitre's seam on an end face; butt joints show up to 1.6 there
 MITRE_MARGIN = 1.3  # ... over the seams of butt joints
@@ -43,7 +44,7 @@ class Decided:
     kind: int  # contact type, 1, 2 or 4
     other: Joint | None
     evidence: ContactEvidence
-    mitre: EndFace | None = None  # what end faces show of a corner that may be a mitre
+    mitre: EndFace | None = None  # what its end faces show; None where it cannot be a mitre
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +91,7 @@ def find_contacts(
             either = [near.get(key) or _unfinished(scene, far.get(key)) for key in keys]
             either = [one or (doubtful.get(key) if other and key[::-1] not in near else None)
                       for key, one, other in zip(keys, either, either[::-1], strict=True)]
+            either = _without_slivers(either)
             if all(either) and any(key in near or key in doubtful for key in keys):
                 found.append(_corner(scene, *either, settled.get(frozenset((a, b)))))
             elif any(either):
@@ -98,6 +100,12 @@ def find_contacts(
                 seen = [d for key in keys if (d := _confirmed(scene, far.get(key)))]
                 found.extend(sorted(seen, key=lambda d: -d.evidence.seam_score)[:1])
     return _like_their_twins(scene, found)
+
+
+def _without_slivers(either: list[Joint | None]) -> list[Joint | None]:
+    """A pair's two joints, without one that is far shorter than the other: a ragged outline, and no corner."""
+    longest = max((joint.length for joint in either if joint), default=0.0)
+    return [joint if joint and joint.length >= LEAST_SHARE * longest else None for joint in either]
 
 
 _Joints = dict[tuple[int, int], Joint]

@@ -10,6 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import shapely
+from shapely.geometry import Polygon
 
 from kerfwright.assemble.joints import Joint, face_plane, trace_of
 from kerfwright.assemble.visibility import Obstacles
@@ -18,6 +20,7 @@ from kerfwright.identify.types import Sheet
 
 __all__ = ["CornerLines", "EndFace", "corner_lines", "look_for_mitre", "mitred", "overlapping"]
 
+FAR = 1e4  # mm; longer than any board
 SWEPT = 20  # places along a line across an end face, which is as wide as a board is thick
 # shares of the lines that are swept, and of their length that they are swept to either side, so that no silhouette is
 # crossed: a sweep of the diagonal leaves the wood near the outer corner
@@ -106,32 +109,37 @@ def overlapping(sheets: tuple[Sheet, ...], first: Joint, second: Joint) -> bool:
 def look_for_mitre(
     sheets: tuple[Sheet, ...], first: Joint, second: Joint, photos: Photos, obstacles: Obstacles, diameter: float,
     flush: float,
-) -> EndFace | None:
-    """The corner's end face that most photographs show; None where the boards do not end within `flush` mm of each
-    other, or no photograph shows it.
+) -> EndFace:
+    """The corner's end face that most photographs show; without views where the boards do not end within `flush` mm of
+    each other, or no photograph shows it.
     """
     lines = corner_lines(sheets, first, second)
-    extents = np.array([_extent(sheets[j.b], j, lines.axis) for j in (first, second)])
-    found = []
+    extents = np.array([_extent(sheets, j, lines.axis) for j in (first, second)])
+    found = [EndFace(0.0, 0.0, 0)]
     for side, sign in ((0, -1.0), (1, 1.0)):
         if np.ptp(extents[:, side]) <= flush:
             height = float(extents[:, side].mean())
             found.append(_end_face(lines, height, sign * lines.axis, photos, obstacles, diameter))
-    found = [face for face in found if face is not None]
-    return max(found, key=lambda face: (face.views, face.mitre), default=None)
+    return max(found, key=lambda face: (face.views, face.mitre))
 
 
-def _extent(board: Sheet, joint: Joint, axis: np.ndarray) -> tuple[float, float]:
-    """From where to where the joint runs, along the corner's axis."""
-    along = np.array(joint.intervals).ravel()
-    line = joint.trace.place(np.zeros(len(along)), along)
-    at = board.to_world(np.c_[line, np.full(len(line), joint.trace.depth)]) @ axis
+def _extent(sheets: tuple[Sheet, ...], joint: Joint, axis: np.ndarray) -> tuple[float, float]:
+    """From where to where the board that ends has wood beside the corner, along its axis."""
+    board, trace = sheets[joint.b], joint.trace
+    depth = sheets[joint.a].thickness.value / trace.sine
+    band = [trace.place(np.full(2, x), np.array([-FAR, FAR])) for x in (-depth, depth)]
+    near = shapely.get_coordinates(board.region.intersection(Polygon([*band[0], *band[1][::-1]])))
+    if not len(near):
+        return np.nan, np.nan
+    along = trace.coordinates(near)[1]
+    line = trace.place(np.zeros(2), np.array([along.min(), along.max()]))
+    at = board.to_world(np.c_[line, np.full(2, trace.depth)]) @ axis
     return float(at.min()), float(at.max())
 
 
 def _end_face(
     lines: CornerLines, height: float, outward: np.ndarray, photos: Photos, obstacles: Obstacles, diameter: float
-) -> EndFace | None:
+) -> EndFace:
     lift = height * lines.axis
     across = [(lines.outer, DIAGONAL, DIAGONAL_REACH)]
     across += [(end, STRAIGHT, STRAIGHT_REACH) for end in (lines.seam_b, lines.seam_a)]
@@ -140,7 +148,7 @@ def _end_face(
         for end, shares, reach in across
     ]
     if shown[0] is None:
-        return None
+        return EndFace(0.0, 0.0, 0)
     return EndFace(shown[0][0], max((s[0] for s in shown[1:] if s is not None), default=0.0), shown[0][1])
 
 

@@ -230,6 +230,8 @@ def _solved(fits: list[Fit], samples: list[Samples], guides: list[GuideLine], st
             right[block] += side
             at += len(shape.unknowns)
         value, jacobian = _all_equations(shapes, guides, state.kept, x)
+        if not np.isfinite(jacobian).all():
+            return None  # steps that contradict each other have grown without bound
         step, covariance = constrained_step(normal, right, value, jacobian, 1e-6)
         x = x + step
         if np.abs(step).max() < 1e-4:
