@@ -64,6 +64,16 @@ def test_a_mitre_of_two_thicknesses_runs_through_both_corners():
     assert lines.normal @ lines.into_b > 0 > lines.normal @ lines.into_a
 
 
+def test_gaps_that_one_ragged_outline_leaves_are_closed():
+    first, second = corner()
+    ragged = replace(second, region=second.region.difference(box(-5, 30, 30, 70)))
+    found = joints((first, ragged))
+    assert len(found[0].intervals) == 2
+    for joint in mitred((first, ragged), *found):
+        (interval,) = joint.intervals
+        assert np.ptp(interval) == pytest.approx(100, abs=3)
+
+
 def end_face(tone, sheets):
     return look_for_mitre(sheets, *joints(sheets), Painted(tone), nothing_hides(), D, flush=3.0)
 
@@ -97,8 +107,9 @@ def test_where_a_board_ends_is_read_beside_the_corner_even_where_its_joint_is_ra
 
 
 def test_only_boards_that_both_reach_the_outer_corner_may_be_mitred():
+    for degrees in (60, 90, 135):
+        assert overlapping(corner(degrees), *joints(corner(degrees)))
     first, second = corner()
-    assert overlapping((first, second), *joints((first, second)))
     stopped = sheet("second", second.world_from_board, T, (T - 6, 0, 200, 100))
     assert not overlapping((first, stopped), *joints((first, stopped)))
 

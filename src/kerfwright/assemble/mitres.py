@@ -27,7 +27,7 @@ SWEPT = 20  # places along a line across an end face, which is as wide as a boar
 DIAGONAL, DIAGONAL_REACH = (0.08, 0.6), 0.36
 STRAIGHT, STRAIGHT_REACH = (0.15, 0.85), 0.42
 GRAZING = 0.25  # least cosine between an end face's normal and the line of sight
-REACHED = 0.5  # of the other board's thickness that an outline must cover to reach the outer corner
+REACHED = 0.5  # of the way from the other board's inner face to the outer corner that an outline must cover
 
 
 @dataclass(frozen=True)
@@ -87,11 +87,12 @@ def corner_lines(sheets: tuple[Sheet, ...], first: Joint, second: Joint) -> Corn
 
 
 def mitred(sheets: tuple[Sheet, ...], first: Joint, second: Joint) -> tuple[Joint, Joint]:
-    """The two joints of a corner moved onto the mitre's plane: in b, and in a.
+    """The two joints of a corner moved onto the mitre's plane: in b, and in a; gaps of ragged outlines are closed.
 
     Boards of one thickness meet in the plane that halves their angle.
     """
     lines = corner_lines(sheets, first, second)
+    first, second = _closed(sheets, first, second, lines.axis)
     normal, offset = lines.normal, float(lines.normal @ lines.inner)
     in_b = trace_of(sheets[first.b], normal, offset)
     in_a = trace_of(sheets[first.a], -normal, -offset)
@@ -100,10 +101,40 @@ def mitred(sheets: tuple[Sheet, ...], first: Joint, second: Joint) -> tuple[Join
     return replace(first, trace=in_b), replace(second, trace=in_a)
 
 
+def _closed(sheets: tuple[Sheet, ...], first: Joint, second: Joint, axis: np.ndarray) -> tuple[Joint, Joint]:
+    """The joints without gaps that are narrow, or that the other board's outline covers."""
+    narrow = 2 * max(sheets[j.b].thickness.value for j in (first, second))
+    scales = [_along_axis(sheets[j.b], j, axis) for j in (first, second)]
+    spans = [
+        [sorted((sign * low + start, sign * high + start)) for low, high in joint.intervals]
+        for joint, (sign, start) in zip((first, second), scales, strict=True)
+    ]
+    runs: list[list[float]] = []
+    for low, high in sorted(spans[0] + spans[1]):
+        if runs and low - runs[-1][1] <= narrow:
+            runs[-1][1] = max(runs[-1][1], high)
+        else:
+            runs.append([low, high])
+    closed = []
+    for joint, (sign, start), own in zip((first, second), scales, spans, strict=True):
+        held = [[x for span in own if low <= span[0] <= high for x in span] for low, high in runs]
+        back = [sorted((sign * (min(h) - start), sign * (max(h) - start))) for h in held if h]
+        closed.append(replace(joint, intervals=tuple((low, high) for low, high in sorted(back))))
+    return closed[0], closed[1]
+
+
+def _along_axis(board: Sheet, joint: Joint, axis: np.ndarray) -> tuple[float, float]:
+    """Sign and start of a joint's own positions along the corner's axis: at = sign * position + start."""
+    line = joint.trace.place(np.zeros(2), np.array([0.0, 1.0]))
+    at = board.to_world(np.c_[line, np.full(2, joint.trace.depth)]) @ axis
+    return float(np.sign(at[1] - at[0])), float(at[0])
+
+
 def overlapping(sheets: tuple[Sheet, ...], first: Joint, second: Joint) -> bool:
     """Whether both boards' outlines reach the corner's outer line, as those of a mitre do."""
-    depths = [sheets[j.a].thickness.value / j.trace.sine for j in (first, second)]
-    return all(j.gap < -REACHED * depth for j, depth in zip((first, second), depths, strict=True))
+    outer = corner_lines(sheets, first, second).outer[None]
+    places = [j.trace.coordinates(sheets[j.b].to_board(outer)[:, :2])[0][0] for j in (first, second)]
+    return all(j.gap < REACHED * place for j, place in zip((first, second), places, strict=True))
 
 
 def look_for_mitre(
