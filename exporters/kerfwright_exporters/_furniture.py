@@ -122,15 +122,14 @@ def largest(cut) -> Solid:
     return max(cut.solids(), key=lambda piece: piece.volume)
 
 
-def off(solid, other, sheet, gap) -> Solid:
+def off(solid, other, sheet, gap=0.1) -> Solid:
     """The board as it is, unless it runs into the other: then without what that fills, and the gap round it."""
-    rest = solid.cut(other)
-    if solid.volume - rest.volume < 0.1:  # mm3, rounding
+    if solid.volume - solid.cut(other).volume < 0.1:  # mm3, rounding
         return solid
-    ways = [axis * step for axis in (sheet.x, sheet.y, sheet.normal) for step in (gap, -gap)] if gap else []
-    for way in ways:
-        rest = largest(rest).cut(other.moved(Location(way)))
-    return largest(rest).clean()
+    for axis in (sheet.x, sheet.y, sheet.normal):
+        for step in (gap, -gap):
+            solid = largest(solid.cut(other.moved(Location(axis * step))))
+    return solid.clean()
 
 
 # --- end ---

@@ -16,30 +16,24 @@ from kerfwright.solid.interference import near_pairs, separation
 __all__ = ["ClosePair", "close_pairs"]
 
 NEAR = 10.0  # mm; half the stock that most boards have, and far more than a tenth of it
-GAP = 0.1  # mm left between boards that do not touch; ten times what counts as touching
 
 
 @dataclass(frozen=True)
 class ClosePair:
-    """Two boards by number: which is cut back if they meet, which stays, and what is left between them, mm."""
+    """Two boards by number: which is cut back if they meet, and which stays."""
 
     gives_way: int
     stays: int
-    gap: float
 
 
 def close_pairs(model: Model) -> list[ClosePair]:
-    """Pairs within NEAR of each other, in the model's order; of two that do not touch, the smaller board gives way."""
+    """Pairs without a contact within NEAR of each other, in the model's order; the smaller board gives way."""
     shapes = [shape_of(name, solid) for name, solid in assembly_solids(model)]
     number = {shape.name: k for k, shape in enumerate(shapes)}
-    ending = {frozenset((c.a, c.b)): c.b for c in model.contacts}
+    joined = {frozenset((c.a, c.b)) for c in model.contacts}
     found = []
     for pair in near_pairs(shapes, NEAR):
-        if separation(*pair) > NEAR:
-            continue
-        names = [shape.name for shape in pair]
-        smaller = min(pair, key=lambda shape: shape.solid.volume).name
-        first = ending.get(frozenset(names), smaller)
-        (other,) = (name for name in names if name != first)
-        found.append(ClosePair(number[first], number[other], 0.0 if frozenset(names) in ending else GAP))
+        if frozenset(shape.name for shape in pair) not in joined and separation(*pair) <= NEAR:
+            small, large = sorted(pair, key=lambda shape: shape.solid.volume)
+            found.append(ClosePair(number[small.name], number[large.name]))
     return found

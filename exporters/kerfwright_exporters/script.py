@@ -157,12 +157,10 @@ def _segment(edge: Edge) -> str:
 
 def _close(model: Model, names: list[str]) -> Iterator[str]:
     labels = ascii_labels(model)
-    yield "\n\n# Boards near each other. Should two meet after a change, the first is cut back to the second;"
-    yield "# the gap that is left between those that do not touch stands last"
+    yield "\n\n# Boards near each other that do not touch: should two meet after a change, the first is cut back"
     yield "CLOSE = ["
     for pair in close_pairs(model):
-        stays = names[pair.stays].upper()
-        yield f'    ("{labels[pair.gives_way]}", "{labels[pair.stays]}", {stays}, {number(pair.gap)}),'
+        yield f'    ("{labels[pair.gives_way]}", "{labels[pair.stays]}", {names[pair.stays].upper()}),'
     yield "]"
 
 
@@ -173,8 +171,8 @@ def _assembly(model: Model, names: list[str]) -> Iterator[str]:
     for label, name in zip(ascii_labels(model), names, strict=True):
         yield f'        "{label}": {name}(),'
     yield "    }"
-    yield "    for first, second, sheet, gap in CLOSE:"
-    yield "        boards[first] = off(boards[first], boards[second], sheet, gap)"
+    yield "    for first, second, sheet in CLOSE:"
+    yield "        boards[first] = off(boards[first], boards[second], sheet)"
     yield "    for name, solid in boards.items():"
     yield "        solid.label = name"
     yield f'    return Compound(label="{ascii_name(model.name)}", children=list(boards.values()))'

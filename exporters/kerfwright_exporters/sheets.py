@@ -21,7 +21,7 @@ from kerfwright_exporters.dimensions import OUTSIDE, sheet_dimensions
 from kerfwright_exporters.drawing import Drawing, Text, board_drawing, cutting_path, moved_drawing, outline_polygon
 from kerfwright_exporters.dxf import add_drawing, dxf_bytes, new_document
 from kerfwright_exporters.layers import layer_colour, layer_name
-from kerfwright_exporters.naming import file_stems, plain_name
+from kerfwright_exporters.naming import STAMP, file_stems, plain_name
 from kerfwright_exporters.nesting import NestOptions, Place, nest
 from kerfwright_exporters.options import ExportOptions
 from kerfwright_exporters.pdf import sheet_scale, sheets_pdf
@@ -78,7 +78,7 @@ def export(model: Model, out_dir: Path, options: ExportOptions) -> list[Path]:
         write_bytes(paths[-1], _svg(sheet, options))
     paths += [folder / "sheets.pdf", folder / "sheets.json"]
     write_bytes(paths[-2], sheets_pdf(model, sheets, options))
-    write_bytes(paths[-1], (json.dumps(_summary(sheets), indent=1) + "\n").encode("utf-8"))
+    write_bytes(paths[-1], (json.dumps(_summary(sheets, options), indent=1) + "\n").encode("utf-8"))
     return paths
 
 
@@ -201,7 +201,7 @@ def _svg(sheet: Sheet, options: ExportOptions) -> bytes:
     return svg_document(elements, box, options)
 
 
-def _summary(sheets: list[Sheet]) -> dict[str, object]:
+def _summary(sheets: list[Sheet], options: ExportOptions) -> dict[str, object]:
     """Utilisation of each sheet and of all of them."""
     area = sum(sheet.length * sheet.width for sheet in sheets)
     used = sum(board.area for sheet in sheets for board in sheet.boards)
@@ -216,4 +216,5 @@ def _summary(sheets: list[Sheet]) -> dict[str, object]:
         }
         for sheet in sheets
     ]
-    return {"utilisation": round(used / area, 4) if area else 0.0, "sheets": rows}
+    stamp = {"stamp": STAMP} if options.unverified else {}
+    return {**stamp, "utilisation": round(used / area, 4) if area else 0.0, "sheets": rows}

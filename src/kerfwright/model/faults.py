@@ -14,7 +14,15 @@ import numpy as np
 
 from kerfwright.errors import shown
 from kerfwright.model.cutpath import Circle, CutPath, Loop
-from kerfwright.model.geometry import edge_end, edge_length, edge_start, path_polygon, sample_loop, signed_area
+from kerfwright.model.geometry import (
+    edge_end,
+    edge_length,
+    edge_points,
+    edge_start,
+    path_polygon,
+    sample_loop,
+    signed_area,
+)
 from kerfwright.model.types import Board, Model
 
 __all__ = ["Fault", "faults"]
@@ -24,6 +32,7 @@ __all__ = ["Fault", "faults"]
 _MARKS = " _.-"
 _LONGEST = 100
 JOIN_TOLERANCE = 1e-4  # mm between an edge's end and the next one's start; a thousand times what OCCT closes by itself
+LARGEST = 1e6  # mm; a board of a kilometre is a slip of units, and OCCT fails on far larger ones
 RIGID_TOLERANCE = 1e-6  # of a pose's turn from an orthonormal one: a micrometre on a metre
 
 
@@ -82,9 +91,10 @@ def _is_safe(name: str) -> bool:
 
 def _board_faults(index: int, board: Board) -> Iterator[Fault]:
     where = f"boards[{index}] {shown(repr(board.name))}"
-    if board.thickness.value <= 0:
+    if not 0 < board.thickness.value <= LARGEST:
+        wanted = "above 0" if board.thickness.value <= 0 else f"of {LARGEST:g} mm at most"
         yield Fault(
-            "K103", f"{where}.thickness", f"{board.thickness.value:g} mm", "give a thickness above 0", (board.name,)
+            "K103", f"{where}.thickness", f"{board.thickness.value:g} mm", f"give a thickness {wanted}", (board.name,)
         )
     if problem := _pose_problem(np.array(board.model_from_board)):
         yield Fault(
@@ -105,6 +115,8 @@ def _board_faults(index: int, board: Board) -> Iterator[Fault]:
 
 def _pose_problem(pose: np.ndarray) -> str | None:
     turn = pose[:3, :3]
+    if np.abs(pose[:3, 3]).max() > LARGEST:
+        return f"its shift is beyond {LARGEST:g} mm"
     if not np.allclose(pose[3], (0, 0, 0, 1), atol=RIGID_TOLERANCE):
         return f"last row {pose[3].tolist()} is not 0 0 0 1"
     if not np.allclose(turn @ turn.T, np.eye(3), atol=RIGID_TOLERANCE):
@@ -138,6 +150,8 @@ def _loop_problem(loop: Loop) -> tuple[str, str, str] | None:
         gap = float(np.hypot(*np.subtract(edge_start(after), edge_end(edge))))
         if gap > JOIN_TOLERANCE:
             return "K105", f"open by {gap:.4g} mm after edge {k}", "end each edge where the next one starts"
+    if max(np.abs(edge_points(edge, np.linspace(0, 1, 9))).max() for edge in loop.edges) > LARGEST:
+        return "K105", f"reaches beyond {LARGEST:g} mm", "give millimetres, near the board's own origin"
     points = sample_loop(loop)
     if len(points) < 3:
         return "K105", f"{len(loop.edges)} edges enclose nothing", "give three edges or more, or a curve"

@@ -40,6 +40,7 @@ class TrimOptions:
     touch: float = 1e-3  # mm; boards less deep in each other do not run into each other
     volume: float = 0.01  # mm3, the same for what they share
     deepest: float = 1 / 1000  # a deeper overlap is no slip of a fit
+    clear: float = 0.6  # mm left where boards without a contact are trimmed; nearer faces would pass for a gap
     end: float = 1 / 10000  # depth up to which a whole edge is moved onto the sheet that it ends on
     slit: float = 1 / 1000  # what doubles back on itself closer than this is a slip of a fit, no slot
     around: float = 1 / 500  # how far about the overlap an outline may change
@@ -183,8 +184,9 @@ def _areas(
                     yield from _area(board, [end], outline, options.end, options)
     for piece in shared:
         faces = [face for face in other.faces if any(_same_plane(face, own, options.touch) for own in piece.faces)]
-        lines = [line for face in faces if (line := _line(board, face))]
-        yield from _area(board, lines, _flat(board, piece.points), options.deepest, options)
+        clear = 0.0 if contact is not None else options.clear
+        lines = [(line[0], line[1] + clear) for face in faces if (line := _line(board, face))]
+        yield from _area(board, lines, _flat(board, piece.points), options.deepest + clear, options)
 
 
 def _ends(
