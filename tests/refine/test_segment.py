@@ -21,9 +21,10 @@ from kerfwright.refine.segment.edges import PITCH, EdgeScan, trace, view_offsets
 from kerfwright.refine.segment.evidence import cut_face_band, signed_distance
 from kerfwright.refine.segment.graphcut import cut, smoothness_weights
 from kerfwright.refine.segment.grid import Grid, grid_over
+from kerfwright.refine.segment.rectify import even_out
 from kerfwright.refine.segment.scene import BOARD, CLEAR, OCCLUDED, Occluders, slab_mesh
 from kerfwright.refine.segment.topology import clean, pieces
-from kerfwright.refine.segment.views import BoardView
+from kerfwright.refine.segment.views import BoardView, choose_views
 
 GRID = Grid(np.array([-20.0, -20.0]), 1.0, (60, 80))
 
@@ -210,6 +211,17 @@ def test_cut_follows_evidence_seeds_and_constraints() -> None:
     assert not mask[x > 21].any()
 
 
+def test_cut_looks_only_where_wood_may_be() -> None:
+    x, y = np.moveaxis(GRID.centres(), 2, 0)
+    evidence = np.where((x > 0) & (x < 12) & (y > 3) & (y < 20), 2.0, -2.0)
+    weights = smoothness_weights(np.zeros((4, *GRID.shape)), np.zeros((4, *GRID.shape), bool), 0.1)
+    inside, outside = np.hypot(x - 5, y - 10) < 2, np.hypot(x - 5, y - 10) > 15
+    mask = cut(evidence, weights, inside, outside)
+    assert (mask == ((evidence > 0) & ~outside)).mean() > 0.999
+    assert not mask[outside].any()
+    assert not cut(evidence, weights, inside, np.ones_like(inside)).any()
+
+
 # --- boundary ---
 
 
@@ -338,3 +350,26 @@ def test_constraints_must_match_the_sheets(tiny) -> None:
     capture, sheets, _ = tiny
     with pytest.raises(OptionError, match="constraints"):
         segment_boards(sheets, [[]], capture)
+
+
+# --- views and exposure ---
+
+
+def test_exposure_is_evened_out_within_a_side() -> None:
+    wood = np.full((6, 8, 3), (150, 120, 90), np.uint8)
+    images = [wood, (wood * 0.8).astype(np.uint8), (wood * 1.2).astype(np.uint8), (wood * 0.5).astype(np.uint8)]
+    everywhere = [np.ones((6, 8), bool)] * 4
+    top, darker, brighter, other_side = even_out(images, everywhere, [1, 1, 1, -1])
+    assert abs(darker - top).max() < 1
+    assert abs(brighter - top).max() < 1
+    assert other_side[..., 0].mean() < top[..., 0].mean() - 10
+
+
+def test_views_are_picked_until_all_is_seen_and_no_more_than_allowed(tiny) -> None:
+    capture, sheets, _ = tiny
+    occluders = Occluders(sheets, [[s.region] for s in sheets])
+    for allowed in (1, 2, 7):
+        views = choose_views(sheets[1], 1, capture.views, occluders, SegmentOptions(max_views=allowed))
+        assert len(views) <= allowed
+        assert len({v.view.name for v in views}) == len(views)
+    assert {v.side for v in views} == {1, -1}

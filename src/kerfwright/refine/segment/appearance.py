@@ -71,11 +71,17 @@ def same_surface(colours: np.ndarray, others: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(squared), log_density, -np.inf).astype(np.float32)
 
 
-def fit_mixture(colours: np.ndarray, components: int, samples: int, rng: np.random.Generator) -> Mixture | None:
-    """A mixture of (N, 3) colours, by k-means and a few steps of EM on a sample; None of too few colours."""
-    if len(colours) < 10 * components:
+def fit_mixture(
+    colours: np.ndarray, components: int, samples: int, rng: np.random.Generator, rows: np.ndarray | None = None
+) -> Mixture | None:
+    """A mixture of (N, 3) colours, or of some rows of them, by k-means and a few steps of EM on a sample; None of too
+    few.
+    """
+    count = len(colours) if rows is None else len(rows)
+    if count < 10 * components:
         return None
-    picked = colours[rng.choice(len(colours), min(samples, len(colours)), replace=False)].astype(np.float32)
+    picked = rng.choice(count, min(samples, count), replace=False)
+    picked = colours[picked if rows is None else rows[picked]].astype(np.float32)
     mixture = _mixture(picked, _one_hot(_nearest(picked, components)))
     for _ in range(EM_STEPS):
         joint = mixture._joint(picked)

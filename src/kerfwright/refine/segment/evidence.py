@@ -176,13 +176,14 @@ def gather(
     `others` (rows, cols, 3) is the mean of the other views of the same side, NaN where there is none.
     """
     beyond = seen & seeds.beyond & ~band
-    inside = _learn(_balanced(lab, seen & seeds.inside, seeds.distance), options, rng)
-    outside = {kind: _learn(lab[beyond & (kinds == kind)], options, rng) for kind in (CLEAR, BOARD)}
+    inside = _learn(lab, _balanced(seen & seeds.inside, seeds.distance), options, rng)
+    outside = {kind: _learn(lab, np.flatnonzero(beyond & (kinds == kind)), options, rng) for kind in (CLEAR, BOARD)}
     if inside is None:
         return None
     inside = with_shade(inside)
     ask = seen & ~seeds.outside & ~seeds.inside
-    apart = ((lab - others) ** 2).sum(2)
+    apart = lab - others
+    apart = np.einsum("ijk,ijk->ij", apart, apart)
     nats, weight = np.zeros(seen.shape, np.float32), np.zeros(seen.shape, np.float32)
     for kind, other in ((CLEAR, BOARD), (BOARD, CLEAR)):
         model = outside[kind] or outside[other]
@@ -209,18 +210,21 @@ def _parallax_ratio(apart: np.ndarray, inside: np.ndarray, outside: np.ndarray) 
     return np.where(known, ratio[np.digitize(np.where(known, apart, 0), bins) - 1], 0).astype(np.float32)
 
 
-def _balanced(lab: np.ndarray, mask: np.ndarray, distance: np.ndarray) -> np.ndarray:
-    """Colours inside, those near the outline as many as all others: light changes over a board, and there it counts."""
-    near = lab[mask & (distance < NEAR_OUTLINE)]
-    rest = lab[mask & (distance >= NEAR_OUTLINE)]
+def _balanced(mask: np.ndarray, distance: np.ndarray) -> np.ndarray:
+    """Pixels inside, flat indices, those near the outline as many as all others: light changes over a board, and there
+    it counts.
+    """
+    near = np.flatnonzero(mask & (distance < NEAR_OUTLINE))
+    rest = np.flatnonzero(mask & (distance >= NEAR_OUTLINE))
     if not len(near) or not len(rest):
-        return lab[mask]
+        return np.flatnonzero(mask)
     few = max(1, len(rest) // len(near)), max(1, len(near) // len(rest))
     return np.concatenate([near[:: few[1]], rest[:: few[0]]])
 
 
-def _learn(colours: np.ndarray, options: SegmentOptions, rng: np.random.Generator) -> Mixture | None:
-    return fit_mixture(colours, options.components, options.samples, rng)
+def _learn(lab: np.ndarray, pixels: np.ndarray, options: SegmentOptions, rng: np.random.Generator) -> Mixture | None:
+    """A mixture of the colours of some pixels, given by flat indices."""
+    return fit_mixture(lab.reshape(-1, 3), options.components, options.samples, rng, pixels)
 
 
 def _log_ratio(
@@ -236,13 +240,15 @@ def _log_ratio(
 
 def means_of_others(labs: Sequence[np.ndarray], seen: Sequence[np.ndarray], sides: Sequence[int]) -> list[np.ndarray]:
     """For each view the mean of the other views of its side, (rows, cols, 3), NaN where no other sees the pixel."""
+    shown = [np.where(m[..., None], lab, 0) for lab, m in zip(labs, seen, strict=True)]
+    totals = {s: sum(lab for lab, t in zip(shown, sides, strict=True) if t == s) for s in set(sides)}
+    counts = {s: sum(m.astype(np.float32) for m, t in zip(seen, sides, strict=True) if t == s) for s in set(sides)}
     out = []
-    totals = {s: (sum(lab * m[..., None] for lab, m, t in zip(labs, seen, sides, strict=True) if t == s),
-                  sum(m.astype(np.float32) for m, t in zip(seen, sides, strict=True) if t == s)) for s in set(sides)}
-    for lab, mask, side in zip(labs, seen, sides, strict=True):
-        total, count = totals[side]
-        rest = (count - mask)[..., None]
-        out.append(np.where(rest > 0, (total - lab * mask[..., None]) / np.maximum(rest, 1), np.nan))
+    for lab, mask, side in zip(shown, seen, sides, strict=True):
+        rest = counts[side] - mask
+        mean = (totals[side] - lab) / np.maximum(rest, 1)[..., None]
+        mean[rest <= 0] = np.nan
+        out.append(mean)
     return out
 
 
@@ -252,8 +258,9 @@ def _trust(
     """How well a view tells its training pixels apart, 0 to 1: a shadowed or glossy view must not outvote the rest."""
     if outside is None:
         return LEAST_TRUST
-    means = [_log_ratio(inside, outside, lab[m][:: max(1, int(m.sum()) // 2000)], cap).mean() if m.any() else 0.0
-             for m in (core, beyond)]
+    flat, some = lab.reshape(-1, 3), [np.flatnonzero(m) for m in (core, beyond)]
+    means = [_log_ratio(inside, outside, flat[k[:: max(1, len(k) // 2000)]], cap).mean() if len(k) else 0.0
+             for k in some]
     return float(np.clip((means[0] - means[1]) / cap, LEAST_TRUST, 1.0))
 
 

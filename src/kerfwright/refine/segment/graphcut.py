@@ -18,10 +18,13 @@ STEEPEST = 8.0  # one view's contrast says no more than this: a glint must not o
 def contrast(lab: np.ndarray, inside: np.ndarray) -> np.ndarray:
     """(4, rows, cols) squared colour steps to each neighbour over those usual inside the board."""
     stacked = np.zeros((len(STEPS), *lab.shape[:2]), np.float32)
-    for full, (dy, dx) in zip(stacked, STEPS, strict=True):
-        for channel in np.moveaxis(lab, 2, 0):
+    for channel in np.ascontiguousarray(np.moveaxis(lab, 2, 0)):
+        for full, (dy, dx) in zip(stacked, STEPS, strict=True):
             here, there = neighbours(channel, dy, dx)
-            neighbours(full, dy, dx)[0][...] += (here - there) ** 2
+            step = here - there
+            step *= step
+            view, _ = neighbours(full, dy, dx)
+            view += step
     usual = stacked[:, inside].mean() if inside.any() else stacked.mean()
     return np.minimum(stacked / (4 * max(float(usual), 1.0)), STEEPEST)
 
@@ -35,6 +38,22 @@ def smoothness_weights(contrasts: np.ndarray, crossing: np.ndarray, smoothness: 
 
 def cut(evidence: np.ndarray, weights: np.ndarray, inside: np.ndarray, outside: np.ndarray) -> np.ndarray:
     """The mask: `evidence` > 0 speaks for inside, nats; `inside` and `outside` are hard seeds (outside wins)."""
+    mask = np.zeros(evidence.shape, bool)
+    if outside.all():
+        return mask
+    window = _window(~outside)
+    mask[window] = _least_cut(evidence[window], weights[:, *window], inside[window], outside[window])
+    return mask
+
+
+def _window(mask: np.ndarray) -> tuple[slice, slice]:
+    """The rows and columns that hold a mask, and one more on each side: what lies further out cannot change the cut."""
+    return tuple(
+        slice(max(0, int(hit[0]) - 1), int(hit[-1]) + 2) for hit in (np.flatnonzero(mask.any(axis)) for axis in (1, 0))
+    )
+
+
+def _least_cut(evidence: np.ndarray, weights: np.ndarray, inside: np.ndarray, outside: np.ndarray) -> np.ndarray:
     import maxflow
 
     graph = maxflow.Graph[float](evidence.size, 4 * evidence.size)

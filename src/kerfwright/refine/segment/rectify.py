@@ -59,8 +59,8 @@ def sample(photos: Photos, view: View, pixels: np.ndarray, shrink: int = 1) -> t
     image = photos.get(view, shrink)
     maps = (np.nan_to_num(pixels, nan=-1e6) / shrink - 0.5).astype(np.float32)  # COLMAP's pixel centres to OpenCV's
     colours = cv2.remap(image, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    high = np.array([image.shape[1] - 1, image.shape[0] - 1])
-    return colours, ((maps >= 0) & (maps <= high)).all(-1)
+    x, y = maps[..., 0], maps[..., 1]  # one at a time: reductions over an axis of two are slow
+    return colours, (x >= 0) & (y >= 0) & (x <= image.shape[1] - 1) & (y <= image.shape[0] - 1)
 
 
 def rectify(
