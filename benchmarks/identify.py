@@ -21,7 +21,7 @@ from tables import markdown
 
 from kerfwright.errors import KerfwrightError
 
-SEEDS = 5  # of the annealing
+SEEDS = 3  # of the annealing
 HEADER = (
     "capture", "boards", "extra", "thickness error mm: median", "worst seen", "candidates", "CPU s", "GiB",
     "annealing, total", "extra", "annealing, mean", "extra",
