@@ -21,8 +21,11 @@ from kerfwright.capture import Capture, Cloud, View, open_capture, write_colmap_
 from kerfwright.model import Board, Model, read_model
 from kerfwright.model.frames import matrix, transform_points
 from kerfwright.model.geometry import path_polygon
+from kerfwright.pipeline import STAGES, ReconstructOptions, run_stages
+from kerfwright.progress import Reporter
 
 HEADER = ["variant", "boards", "contacts", "lost or new contacts", "rms, % of D", "largest, % of D", "same bytes"]
+PREPARED = ["variant", "points", "numbers of points that differ", "of poses", "largest"]
 SAMPLE = 1.0  # mm between points of an outline
 
 
@@ -157,6 +160,23 @@ def _diameter(model: Model) -> float:
     return float(np.ptp(np.concatenate(points), axis=0).max())
 
 
+def prepared(folder: Path, scale: float, up: str) -> Capture:
+    """What the stages get of the capture."""
+    options = ReconstructOptions(up=up, millimetres_per_unit=scale)
+    return run_stages(folder, options, Reporter(), stages=STAGES[:1])["capture"]
+
+
+def compare_prepared(found: Capture, base: Capture, variant: Variant) -> list[str]:
+    """A row of the table of what the stages get; working units, D = 500."""
+    if len(found.cloud) != len(base.cloud):
+        return [variant.name, str(len(found.cloud)), "-", "-", "-"]
+    pairs = [(found.cloud.points, base.cloud.points)]
+    pairs += [(a.camera_from_world, b.camera_from_world) for a, b in zip(found.views, base.views, strict=True)]
+    differ = [np.count_nonzero(a != b) for a, b in pairs]
+    largest = max(np.abs(a - b).max() for a, b in pairs)
+    return [variant.name, str(len(found.cloud)), str(differ[0]), str(sum(differ[1:])), f"{largest:.1e}"]
+
+
 def run(capture: Path, out: Path, scale: float, up: str) -> Path:
     """Reconstruct; the path of the model."""
     done = reconstruct(capture, out, ["--scale", repr(scale), "--up", up, "-q"])
@@ -170,6 +190,7 @@ def main() -> None:
     parser.add_argument("capture", type=Path)
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--prepared", action="store_true", help="only what the stages get: equal numbers, equal models")
     given = parser.parse_args()
     shutil.rmtree(given.out / "properties", ignore_errors=True)
     capture, work, rows = open_capture(given.capture), given.out / "properties", []
@@ -177,7 +198,14 @@ def main() -> None:
     for k, variant in enumerate([Variant("untouched", np.eye(4)), *variants(given.seed)]):
         folder = work / str(k) / "capture"  # one name for all, as it stands in the model
         scaled = write_variant(capture, variant, folder)
-        path = run(folder, work / str(k) / "out", capture.scale.millimetres_per_unit / scaled, variant.up)
+        scale = capture.scale.millimetres_per_unit / scaled
+        if given.prepared:
+            found = prepared(folder, scale, variant.up)
+            base = base or found
+            rows.append(compare_prepared(found, base, variant))
+            print(rows[-1], flush=True)
+            continue
+        path = run(folder, work / str(k) / "out", scale, variant.up)
         model = read_model(path)
         if base is None:
             base, before = model, path.read_bytes()
@@ -185,7 +213,7 @@ def main() -> None:
         rows.append([*compare(model, base, variant), "yes" if path.read_bytes() == before else "no"])
         print(rows[-1], flush=True)
         (given.out / "properties.md").write_text(markdown(HEADER, rows))
-    print(markdown(HEADER, rows))
+    print(markdown(PREPARED if given.prepared else HEADER, rows))
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ COMMAND = (sys.executable, "-m", "kerfwright", "reconstruct")
 
 @dataclass(frozen=True)
 class Run:
-    """One run: exit code, wall seconds, also a stage, peak memory in GiB, last line said, seconds of all cores a stage."""
+    """One run: exit code, wall seconds, also a stage, peak memory in GiB, last line said, seconds of all cores."""
 
     code: int
     seconds: float

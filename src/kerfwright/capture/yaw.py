@@ -18,7 +18,7 @@ LAYERS = (
     0.006,
 )  # of the object's size: the thickness of a layer about a face, thinner at each round
 MOST_LAYERS = 12
-POINTS = 100_000  # of the cloud, that decide the angle to a hundredth of a degree
+POINTS = 1_000_000  # of the cloud, that decide the angle; all of most clouds, so that their order does not
 WINDOWS = np.radians([4.0, 2.0, 1.0, 1.0])  # about the peak, narrower at each round
 
 
