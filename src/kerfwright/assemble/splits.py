@@ -1,9 +1,9 @@
 """Boards glued edge to edge: seams that run right across a region seen as one board (method.md; a limit the paper
 names).
 
-A seam is a straight line across the whole board at which the colours step, in every stretch of it and in every view.
-Grain wanders, knots and shadows are short, and an edge where another board stands on this one is already known.
-Precision before recall.
+A seam is a straight line across the whole board at which the wood changes (`discontinuity.py`), in every stretch of it
+and in the views. Grain wanders, knots and shadows are short, and an edge where another board stands on this one is
+already known. Precision before recall.
 """
 
 from __future__ import annotations
@@ -14,24 +14,27 @@ from itertools import pairwise
 import numpy as np
 from shapely.geometry import LineString, Polygon
 
+from kerfwright.assemble.discontinuity import Discontinuity, discontinuity
+from kerfwright.assemble.texture import face_strips
 from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.assemble.visibility import Obstacles
-from kerfwright.identify.photo_edges import Photos, sweep_edge
+from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.types import Sheet
 from kerfwright.model import Contact, ContactEvidence
 
 __all__ = ["SeamLine", "find_seam_lines", "seam_contact", "seam_segments", "split_sheet"]
 
-LEAST_STRENGTH = 3.5  # of a seam, in units of the face's own texture
-CLEAR_STRENGTH = 5.0  # of the best seam of a board: one clear seam lends its weaker neighbours credit
-LEAST_PERSISTENCE = 0.6  # share of all stretches in all views that show it
+LEAST_STRENGTH = 7.0  # of a board's best seam, against the usual change across lines of its face
+LENT_STRENGTH = 4.0  # of further ones: where two boards were glued, more may have been
+LEAST_ALONG = 0.5  # share of the change that every third of the line must show
 LEAST_VIEWS = 4
-MOST_VIEWS = 6
+LEAST_AGREEMENT = 0.75  # mean share of the change that a single view shows
+CENTRED = 4  # samples to either side of a peak that say where its middle lies
 EASED = 1 / 40  # of D; eased edges of two boards lie no further apart
 GAP_SHARE = 0.5  # of the way between two such lines: the rest is rounding; it cannot be told apart from above
 PARTNER = 0.7  # strength of the weaker line of the two
-NARROWEST = 1 / 10  # of D; narrower strips are shadows and edges more often than boards
-
+NARROWEST = 1 / 16  # of D; narrower strips are shadows and edges more often than boards
+KNOWN = 1 / 40  # of D, round lines in which other boards meet this one
 
 @dataclass(frozen=True, eq=False)
 class SeamLine:
@@ -57,54 +60,60 @@ def find_seam_lines(
         for m in (first, np.array([-first[1], first[0]])) for face in ("top", "bottom")
     ]
     best = max(found, key=lambda seams: max((s.strength for s in seams), default=0.0))
-    return sorted(best, key=lambda s: s.offset) if any(s.strength > CLEAR_STRENGTH for s in best) else []
+    return sorted(best, key=lambda s: s.offset)
 
 
 def _seams_across(
     sheet: Sheet, m: np.ndarray, face: str, touching: list[Sheet], photos: Photos, obstacles: Obstacles, diameter: float
 ) -> list[SeamLine]:
-    tangent = np.array([-m[1], m[0]])
     ring = np.asarray(sheet.region.exterior.coords)[:, :2]
-    across, along = ring @ m, ring @ tangent
     margin = NARROWEST * diameter
-    if np.ptp(across) < 2.5 * margin or np.ptp(along) < margin:
+    if np.ptp(ring @ m) < 2.5 * margin or np.ptp(ring @ [-m[1], m[0]]) < margin:
         return []
-    inner = 0.06 * np.ptp(along)
-    at = np.arange(along.min() + inner, along.max() - inner, diameter / 160)
-    offsets = np.arange(across.min() + margin, across.max() - margin, diameter / 1000)
-    height = sheet.thickness.value if face == "top" else 0.0
-    outward = sheet.normal if face == "top" else -sheet.normal
-
-    def line(offset: float) -> np.ndarray:
-        return sheet.to_world(np.c_[offset * m + at[:, None] * tangent, np.full(len(at), height)])
-
-    levels = np.linspace(offsets[0], offsets[-1], 5)
-    visible = np.all([obstacles.visible(photos.views, line(level), outward, 0.35) for level in levels], axis=0)
-    visible[np.argsort(-visible.sum(axis=1), kind="stable")[MOST_VIEWS:]] = False
-    middle = float(offsets.mean())
-    sweep = sweep_edge(
-        photos, line(middle), sheet.world_from_board[:3, :2] @ m, offsets - middle, visible, smoothing=diameter / 600
-    )
-    if sweep is None or sweep.views < LEAST_VIEWS:
+    strips = face_strips(sheet, m, face, photos, obstacles, diameter)
+    if strips is None or len(strips.colours) < LEAST_VIEWS:
         return []
-    strength = sweep.strength / np.median(sweep.strength)
+    change = discontinuity(strips)
+    if change is None:
+        return []
     known = _known_lines(sheet, m, touching)
-    ends = [along.min(), along.max()]
-    step = offsets[1] - offsets[0]
-    found = _peaks(strength, sweep.persistence, reach=round(margin / step))
-    places = [(k, step * _partner(strength, k, EASED * diameter / step)) for k in found]
-    return [
-        SeamLine(m, at, at * m + ends[0] * tangent, at * m + ends[1] * tangent, float(strength[k]), sweep.views,
-                 abs(apart) * GAP_SHARE)
-        for k, apart in places for at in [float(offsets[k] + apart / 2)]
-        if all(abs(at - other) > margin / 2 for other in known) and _crosses_all(sheet.region, m, at, margin / 4)
+    seams = [_seam(change, k, m, ring, diameter) for k in _seam_places(change, ring @ m, margin)]
+    seams = [
+        s for s in seams
+        if all(abs(s.offset - other) > KNOWN * diameter for other in known)
+        and _crosses_all(sheet.region, m, s.offset, margin / 4)
     ]
+    best = max((s.strength for s in seams), default=0.0)
+    return seams if best > LEAST_STRENGTH else []
 
 
-def _peaks(strength: np.ndarray, persistence: np.ndarray, reach: int) -> list[int]:
-    """Places that are strong, persistent, and the strongest within reach."""
-    good = np.flatnonzero((strength > LEAST_STRENGTH) & (persistence > LEAST_PERSISTENCE))
-    return [int(k) for k in good if strength[k] == strength[max(0, k - reach) : k + reach + 1].max()]
+def _seam_places(change: Discontinuity, across: np.ndarray, margin: float) -> list[int]:
+    """Offsets whose change is strong, runs along the whole line, shows in the views, and is the strongest near by."""
+    strength = np.nan_to_num(change.strength)
+    inner = (change.offsets > across.min() + margin) & (change.offsets < across.max() - margin)
+    reach = round(margin / (change.offsets[1] - change.offsets[0]) * 2 / 3)
+    peaks = [
+        int(k) for k in np.flatnonzero(inner & (strength > LENT_STRENGTH))
+        if strength[k] == strength[max(0, k - reach) : k + reach + 1].max()
+    ]
+    return [k for k in peaks if change.along(k) >= LEAST_ALONG and change.unbroken(k) and _agreed(change.views(k))]
+
+
+def _agreed(shares: list[float]) -> bool:
+    return len(shares) >= LEAST_VIEWS and float(np.mean(shares)) >= LEAST_AGREEMENT
+
+
+def _seam(change: Discontinuity, k: int, m: np.ndarray, ring: np.ndarray, diameter: float) -> SeamLine:
+    """The seam at a peak: its middle, ends on the outline's box, and the gap where eased edges show as two lines."""
+    along, strength = ring @ np.array([-m[1], m[0]]), np.nan_to_num(change.strength)
+    step = float(change.offsets[1] - change.offsets[0])
+    apart = step * _partner(strength, k, EASED * diameter / step)
+    near = slice(max(0, k - CENTRED), k + CENTRED + 1)
+    weight = np.maximum(strength[near] - 1, 1e-9)
+    at = float(change.offsets[near] @ weight / weight.sum()) + apart / 2
+    start, end = at * m + np.array([[along.min()], [along.max()]]) * np.array([-m[1], m[0]])
+    views = sum(share > LEAST_ALONG for share in change.views(k))
+    return SeamLine(m, at, start, end, float(strength[k]), views, abs(apart) * GAP_SHARE)
 
 
 def _partner(strength: np.ndarray, k: int, reach: float) -> float:
