@@ -70,7 +70,10 @@ Seed = Annotated[int, typer.Option("--seed", min=0, help="Of the random generato
 Jobs = Annotated[
     int | None, typer.Option("-j", "--jobs", min=1, help="Cores to use; all if not said. The results are the same.")
 ]
-Without = Annotated[str, typer.Option("--without", metavar="PARTS", hidden=True)]  # for benchmarks
+Without = Annotated[
+    str,
+    typer.Option("--without", metavar="PARTS", hidden=True, help="For benchmarks: parts of refinement to leave out."),
+]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Say nothing but errors.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Progress as one JSON object a line, on standard output.")]
 Verbose = Annotated[bool, typer.Option("-v", "--verbose", help="Say more.")]
