@@ -27,6 +27,8 @@ def constraint_segments(
         out[d.joint.b] += _segments(traces[number], d.joint.intervals, "contact", number)
         if d.kind == 4:
             out[d.joint.a] += _segments(d.other.trace, d.other.intervals, "contact", number)
+        elif d.flush is not None:
+            out[d.joint.a] += _segments(d.flush.trace, d.flush.intervals, "corner", number)
         elif d.kind == 2:
             trace = _outer_trace(sheets, d)
             if trace is not None:

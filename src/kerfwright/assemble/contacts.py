@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
+from kerfwright.assemble.flush_ends import flush_end
 from kerfwright.assemble.joints import Joint, Search, end_on, face_plane
 from kerfwright.assemble.mitres import EndFace, corner_lines, look_for_mitre, mitred, overlapping
 from kerfwright.assemble.options import AssembleOptions
@@ -45,6 +46,7 @@ class Decided:
     other: Joint | None
     evidence: ContactEvidence
     mitre: EndFace | None = None  # what its end faces show; None where it cannot be a mitre
+    flush: Joint | None = None  # where a is bevelled flush with b's outer face
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +101,14 @@ def find_contacts(
             else:
                 seen = [d for key in keys if (d := _confirmed(scene, far.get(key)))]
                 found.extend(sorted(seen, key=lambda d: -d.evidence.seam_score)[:1])
-    return _like_their_twins(scene, found)
+    return [_with_flush_end(scene, d) for d in _like_their_twins(scene, found)]
+
+
+def _with_flush_end(scene: _Scene, d: Decided) -> Decided:
+    """A contact with what the cloud shows of a slanted end beside it; at corners the end is flush anyway."""
+    if d.kind != 1:
+        return d
+    return replace(d, flush=flush_end(scene.sheets, d.joint, _outer_face(scene, d.joint), scene.cloud))
 
 
 def _without_slivers(either: list[Joint | None]) -> list[Joint | None]:

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from kerfwright.assemble.contacts import Decided
+from kerfwright.assemble.flush_ends import flush_trace
 from kerfwright.assemble.joints import Joint, face_plane, trace_of
 from kerfwright.assemble.mitres import mitred
 from kerfwright.assemble.options import AssembleOptions
@@ -69,7 +70,15 @@ def _snapped(sheet: Sheet, size: float, keep_bottom: bool) -> Sheet:
 
 def moved_with(sheets: tuple[Sheet, ...], decided: Sequence[Decided]) -> list[Decided]:
     """The same contacts on sheets that were moved along their normals, or made thicker or thinner, since."""
-    return [replace(d, joint=joint, other=other) for d in decided for joint, other in [_moved_pair(sheets, d)]]
+    return [
+        replace(d, joint=joint, other=other, flush=_moved_end(sheets, d.flush))
+        for d in decided for joint, other in [_moved_pair(sheets, d)]
+    ]
+
+
+def _moved_end(sheets: tuple[Sheet, ...], end: Joint | None) -> Joint | None:
+    trace = None if end is None else flush_trace(sheets, end)
+    return None if trace is None else replace(end, trace=trace)
 
 
 def _moved_pair(sheets: tuple[Sheet, ...], d: Decided) -> tuple[Joint, Joint | None]:
