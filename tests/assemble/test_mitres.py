@@ -120,7 +120,8 @@ NOTHING = EndFace(0.0, 0.0, 0)
 
 def decided(monkeypatch, face, outer=1.1, views=8, sheets=None):
     """The contacts of a corner whose outer faces and end face show so much."""
-    monkeypatch.setattr(contacts, "look_for_seam", lambda *a: Seam(outer, views))
+    scores = iter(outer) if isinstance(outer, list) else None
+    monkeypatch.setattr(contacts, "look_for_seam", lambda *a: Seam(next(scores) if scores else outer, views))
     faces = iter(face) if isinstance(face, list) else None
     monkeypatch.setattr(contacts, "look_for_mitre", lambda *a: next(faces) if faces else face)
     cloud = box_cloud(((0, 0, 0), (300, 200, 100)), spacing=20.0)
@@ -152,15 +153,16 @@ def test_without_clear_evidence_a_corner_is_a_butt_joint(monkeypatch, face, oute
     assert found.kind == 2
 
 
-@pytest.mark.parametrize("face", [FAINT, NOTHING])
-def test_an_open_corner_follows_a_clear_mitre_between_boards_of_the_same_sizes(monkeypatch, face):
+@pytest.mark.parametrize(("face", "seam", "kind"), [(FAINT, 1.1, 4), (NOTHING, 1.1, 4), (FAINT, 1.6, 4),
+                                                    (FAINT, 2.0, 2)])  # fmt: skip
+def test_an_open_corner_follows_a_clear_mitre_between_boards_of_the_same_sizes(monkeypatch, face, seam, kind):
     first, second = corner()
     far = second.world_from_board.copy()
     far[:3, 3] += (200 - T, 0, 0)
     sheets = (first, second, sheet("third", far, T, second.region))
-    both = decided(monkeypatch, [MITRE, face], sheets=sheets)
-    assert [d.kind for d in both] == [4, 4]
-    assert [d.evidence.decided_by for d in both] == ["seam", "default"]
+    both = decided(monkeypatch, [MITRE, face], [1.1, 1.1, seam, 1.1], sheets=sheets)
+    assert [d.kind for d in both] == [4, kind]
+    assert [d.evidence.decided_by for d in both] == ["seam", "default" if kind == 4 else "seam"]
 
 
 def test_a_mitre_moves_with_its_boards(monkeypatch):

@@ -30,6 +30,7 @@ LEAST_VIEWS = 3  # photographs that must show an edge for it to decide anything
 MOST_SPOILT = 0.3  # of a gap may be seen through, or taken by another board
 LEAST_SHARE = 0.25  # of the length of a corner's other joint
 CLEAR_MARGIN = 1.25  # ratio of seam scores from which a corner counts as decided by the photographs
+OPEN_SEAM = 1.8  # below this the seam of a butt joint does not rule out that a corner is mitred as its twins are
 LEAST_MITRE = 1.7  # strength of a mitre's seam on an end face; butt joints show up to 1.6 there
 MITRE_MARGIN = 1.3  # ... over the seams of butt joints
 MITRE_VIEWS = 6  # an end face is small: fewer photographs of it say nothing
@@ -257,15 +258,15 @@ def _corner(scene: _Scene, first: Joint, second: Joint, before: Decided | None) 
     )
     joints = (first, second)
     corner = Decided(joints[chosen], 2, joints[1 - chosen], evidence, _end_face(scene, first, second, seams))
-    return _mitre(scene, corner, "seam") if _shows_mitre(corner) else corner
+    return _mitre(scene, corner, "seam") if seams[chosen].score < LEAST_SEAM and _shows_mitre(corner) else corner
 
 
 def _end_face(scene: _Scene, first: Joint, second: Joint, seams: list[Seam]) -> EndFace | None:
     """What the end faces show of a corner that may be a mitre: both boards reach its outer line, and both outer faces
-    were seen without the seam of a butt joint.
+    were seen without a strong seam of a butt joint.
     """
-    bare = all(seam.views >= LEAST_VIEWS and seam.score < LEAST_SEAM for seam in seams)
-    if not bare or not overlapping(scene.sheets, first, second):
+    may_be = all(seam.views >= LEAST_VIEWS and seam.score < OPEN_SEAM for seam in seams)
+    if not may_be or not overlapping(scene.sheets, first, second):
         return None
     flush = scene.mm(scene.options.outline_error)
     return look_for_mitre(scene.sheets, first, second, scene.photos, scene.obstacles, scene.diameter, flush)
@@ -302,23 +303,32 @@ def _middle(sheet: Sheet) -> np.ndarray:
 
 
 def _like_their_twins(scene: _Scene, found: list[Decided]) -> list[Decided]:
-    """Corners that the photographs leave open are decided as the corners between boards of the same sizes are."""
-    clear = [d.joint for d in found if d.kind == 1 or (d.kind == 2 and d.evidence.decided_by == "seam")]
+    """Corners that the photographs leave open are decided as the corners between boards of the same sizes are; one that
+    may be a mitre follows mitres before butt joints with faint seams.
+    """
+    butts = [d for d in found if d.kind == 1 or (d.kind == 2 and d.evidence.decided_by == "seam")]
     mitres = [d for d in found if d.kind == 4]
     out = []
     for d in found:
-        if d.kind == 2 and d.evidence.decided_by == "default":
-            votes = [sum(_alike(scene, j, c) for c in clear) for j in (d.joint, d.other)]
-            if d.mitre is not None and sum(_alike_either_way(scene, d, m) for m in mitres) > max(votes):
-                d = _mitre(scene, d, "default")
-            elif votes[0] < votes[1]:
+        if d.kind == 2 and d.mitre is not None and _votes(scene, d, mitres) > _votes(
+            scene, d, [c for c in butts if c.mitre is None]
+        ):
+            d = _mitre(scene, d, "default")
+        elif d.kind == 2 and d.evidence.decided_by == "default":
+            votes = [sum(_alike(scene, j, c.joint) for c in butts) for j in (d.joint, d.other)]
+            if votes[0] < votes[1]:
                 d = replace(d, joint=d.other, other=d.joint, evidence=_swapped(d.evidence))
         out.append(d)
     return out
 
 
+def _votes(scene: _Scene, corner: Decided, others: list[Decided]) -> int:
+    """How many contacts there are between boards of the same sizes, whichever ends on which."""
+    return sum(_alike_either_way(scene, corner, other) for other in others)
+
+
 def _alike_either_way(scene: _Scene, one: Decided, other: Decided) -> bool:
-    return any(_alike(scene, one.joint, joint) for joint in (other.joint, other.other))
+    return any(_alike(scene, joint, other.joint) for joint in (one.joint, one.other))
 
 
 def _swapped(e: ContactEvidence) -> ContactEvidence:
