@@ -28,7 +28,7 @@ LEAST_SEAM = 1.35  # a visible seam is at least this much stronger than the face
 AS_CLEAR = 0.8  # of the score of the edge at the plane
 LEAST_VIEWS = 3  # photographs that must show an edge for it to decide anything
 MOST_SPOILT = 0.3  # of a gap may be seen through, or taken by another board
-LEAST_SHARE = 0.25  # of the length of a corner's other joint
+LEAST_SHARE = 0.25  # of the length of a corner's other joint; a shorter one is a ragged outline
 CLEAR_MARGIN = 1.25  # ratio of seam scores from which a corner counts as decided by the photographs
 OPEN_SEAM = 1.8  # below this the seam of a butt joint does not rule out that a corner is mitred as its twins are
 LEAST_MITRE = 1.7  # strength of a mitre's seam on an end face; butt joints show up to 1.6 there
@@ -94,7 +94,6 @@ def find_contacts(
             either = [near.get(key) or _unfinished(scene, far.get(key)) for key in keys]
             either = [one or (doubtful.get(key) if other and key[::-1] not in near else None)
                       for key, one, other in zip(keys, either, either[::-1], strict=True)]
-            either = _without_slivers(either)
             if all(either) and any(key in near or key in doubtful for key in keys):
                 found.append(_corner(scene, *either, settled.get(frozenset((a, b)))))
             elif any(either):
@@ -110,12 +109,6 @@ def _with_flush_end(scene: _Scene, d: Decided) -> Decided:
     if d.kind != 1:
         return d
     return replace(d, flush=flush_end(scene.sheets, d.joint, _outer_face(scene, d.joint), scene.cloud))
-
-
-def _without_slivers(either: list[Joint | None]) -> list[Joint | None]:
-    """A pair's two joints, without one that is far shorter than the other: a ragged outline, and no corner."""
-    longest = max((joint.length for joint in either if joint), default=0.0)
-    return [joint if joint and joint.length >= LEAST_SHARE * longest else None for joint in either]
 
 
 _Joints = dict[tuple[int, int], Joint]
@@ -244,11 +237,14 @@ def _ends_before(scene: _Scene, joint: Joint, end: End) -> bool:
 
 
 def _corner(scene: _Scene, first: Joint, second: Joint, before: Decided | None) -> Decided:
-    """Which of two boards stops: the one whose outer face shows the seam."""
+    """Which of two boards stops: the one whose joint is far longer, or else whose outer face shows the seam."""
     if before is not None:
         joints = (first, second) if before.joint.b == first.b else (second, first)
         joints = mitred(scene.sheets, *joints) if before.kind == 4 else joints
         return replace(before, joint=joints[0], other=joints[1])
+    if min(first.length, second.length) < LEAST_SHARE * max(first.length, second.length):
+        joints = (first, second) if first.length > second.length else (second, first)
+        return Decided(joints[0], 2, joints[1], ContactEvidence())
     seams = [_seam(scene, j, _outer_face(scene, j)) for j in (first, second)]
     chosen = 0 if seams[0].score >= seams[1].score else 1
     margin = seams[chosen].score / max(seams[1 - chosen].score, 1e-6)
