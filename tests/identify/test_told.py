@@ -55,7 +55,14 @@ def test_a_board_of_the_same_size_is_as_thick(faint):
     dark, other = told_by_others([region(396, 204), seen], SCENE)
     assert dark.best.value == pytest.approx(12.0)
     assert dark.best.evidence == "twin"
+    assert dark.told and not other.told
     assert other is seen
+
+
+def test_a_frame_of_front_edges_is_no_twin_of_a_side(faint):
+    frame = Known((0,), pose((0, 0, 0)), box(0, 0, 400, 200).difference(box(30, 30, 370, 170)), NO_RIM, ())
+    side = region(400, 200, edge(12.0), at=50.0)
+    assert told_by_others([frame, side], SCENE)[0].best is None
 
 
 def test_twins_that_disagree_tell_nothing(faint):

@@ -94,11 +94,12 @@ def candidate_slabs(
     seeds = [seed for number in range(len(planes)) for seed in _seeds(scene, number)]
     known = told_by_others([_looked_at(scene, seed) for seed in seeds], scene)
     stock = _common(known)
-    found = [slab for k in known for h in k.hypotheses for slab in _slabs(scene, k.top, k.frame, k.piece, h)]
+    own = [k for k in known if k.hypotheses and not k.told]
+    found = [slab for k in own for h in k.hypotheses for slab in _slabs(scene, k.top, k.frame, k.piece, h)]
     found = [slab for slab in found if slab.thickness.evidence not in UNSEEN or scene.is_broad(slab.region)]
     for k in known:
-        if not k.hypotheses and scene.is_broad(k.piece):
-            rough = [slab for h in stock for slab in _slabs(scene, k.top, k.frame, k.piece, h)]
+        if (k.told or not k.hypotheses) and scene.is_broad(k.piece):
+            rough = [slab for h in k.hypotheses or stock for slab in _slabs(scene, k.top, k.frame, k.piece, h)]
             found.extend(piece for slab in rough for piece in _without_others(scene, slab, found))
     return _distinct([*found, *_bars(scene, found)])
 

@@ -24,6 +24,7 @@ __all__ = ["Known", "told_by_others"]
 FAINT = 2.0  # strength of an edge that counts when another board shows it too
 ALIKE = 0.04  # relative difference of two thicknesses that may be one
 SAME_SIZE = 0.05  # relative difference of the sides of two boards that may be twins
+SAME_AREA = 0.7  # least share of a twin's area: the front edges of a case make a frame as large as its sides
 TWIN_ERROR = 0.05  # relative standard error of a thickness that a twin told
 
 
@@ -36,6 +37,7 @@ class Known:
     piece: Polygon
     rim: Rim
     hypotheses: tuple[ThicknessHypothesis, ...]
+    told: bool = False  # by others: what they fill is none of this board's
 
     @property
     def best(self) -> ThicknessHypothesis | None:
@@ -69,12 +71,12 @@ def told_by_others(known: list[Known], scene: _Scene) -> list[Known]:
         others += [h.value for j in open_ if j != i for h in faint[j]]
         backed = [h for h in faint[i] if any(abs(h.value - v) < ALIKE * h.value for v in others)]
         if backed:
-            out[i] = replace(known[i], hypotheses=tuple(backed[:1]))
+            out[i] = replace(known[i], hypotheses=tuple(backed[:1]), told=True)
     told = list(out)
     for i in open_:
         twin = None if out[i].hypotheses else _twin(out[i], out)
         if twin is not None:
-            told[i] = replace(out[i], hypotheses=(twin,))
+            told[i] = replace(out[i], hypotheses=(twin,), told=True)
     return told
 
 
@@ -91,7 +93,8 @@ def _twin(known: Known, others: list[Known]) -> ThicknessHypothesis | None:
     """The thickness of boards of the same length and width, if they agree."""
     sides = known.sides
     seen = [k for k in others if k.best is not None and k.best.evidence in ("opposite", "photos")]
-    values = [k.best.value for k in seen if (abs(k.sides / sides - 1) < SAME_SIZE).all()]
+    alike = [k for k in seen if (abs(k.sides / sides - 1) < SAME_SIZE).all()]
+    values = [k.best.value for k in alike if k.piece.area < known.piece.area / SAME_AREA]
     if not values or np.ptp(values) > 2 * ALIKE * np.median(values):
         return None
     value = float(np.median(values))
