@@ -16,6 +16,8 @@ __all__ = ["Limit", "carve", "fill_to_contacts", "limits_of", "margins", "neighb
 
 SLANT = 0.02  # sine of the tilt under which a cut face counts as square
 PARALLEL = 0.995
+BRIDGE = 80.0  # mm between two segments of one contact that are taken for pieces of one
+ON_LINE = 1.0  # mm across, of segments on one line
 TOUCHING = ("contact", "corner", "ground", "photo")  # origins of segments that the board reaches
 
 
@@ -52,8 +54,40 @@ def limits_of(segments: Sequence[ConstraintSegment], thickness: float, reach: fl
     """
     segments = [s for s in segments if np.linalg.norm(s.end - s.start) > 0]
     flat = [_widest(s, segments, thickness) for s in segments]
-    joined = [_extended(limit, flat, reach) for limit in flat]
+    joined = [*(_extended(limit, flat, reach) for limit in flat), *_bridges(segments, flat)]
     return [replace(limit, deep=_depth(limit, joined)) for limit in joined]
+
+
+def _bridges(segments: Sequence[ConstraintSegment], limits: Sequence[Limit]) -> list[Limit]:
+    """The gaps between segments of one contact on one line: the board need not reach it there, but cannot go beyond.
+
+    Contacts come in pieces where the rough outline is ragged.
+    """
+    found = []
+    for limit, follower, gap in _followers(segments, limits):
+        if gap < BRIDGE:
+            found.append(replace(limit, start=limit.end, end=follower.start, touching=False))
+    return found
+
+
+def _followers(
+    segments: Sequence[ConstraintSegment], limits: Sequence[Limit]
+) -> list[tuple[Limit, Limit, float]]:
+    """Each limit with the next one of its contact on its line, and the gap between the two, mm."""
+    pairs = []
+    for segment, limit in zip(segments, limits, strict=True):
+        ahead = []
+        for other_segment, other in zip(segments, limits, strict=True):
+            gap, across, _ = limit.local(other.start)
+            same = (other_segment.origin, other_segment.contact) == (segment.origin, segment.contact)
+            on_line = abs(across) < ON_LINE and limit.along @ other.along > PARALLEL
+            gap -= np.linalg.norm(limit.end - limit.start)
+            if other is not limit and same and on_line and gap > 0:
+                ahead.append((float(gap), other))
+        if ahead:
+            gap, follower = min(ahead, key=lambda found: found[0])
+            pairs.append((limit, follower, gap))
+    return pairs
 
 
 def _shift(segment: ConstraintSegment, z: float) -> float:
