@@ -140,6 +140,17 @@ def test_pieces_of_one_contact_exclude_what_lies_between_them() -> None:
     assert not carve(limits_of([first, other], 10, 5), GRID)[0][between & (y > 0) & (y < 5)].any()
 
 
+def test_edge_seen_in_photographs_keeps_off_what_lies_beyond_but_not_the_exact_edge() -> None:
+    limits = limits_of([segment((10, -15), (10, 25), origin="photo")], 10, 5)
+    excluded, _ = carve(limits, GRID)
+    x, y = np.moveaxis(GRID.centres(), 2, 0)
+    beside = (y > -15) & (y < 25)
+    assert not excluded[beside & (x < 12.9)].any()
+    assert excluded[beside & (x > 13.1)].all()
+    points = np.array([[11.4, 0.0]])
+    assert (snap(points, np.array([0.2]), np.array([[1.0, 0.0]]), limits, 1.5)[0] == points).all()
+
+
 def test_board_is_run_on_to_its_contact_only() -> None:
     mask = GRID.mask(box(-10, -10, 20, 20))
     contact, cut_plane = segment((40, -5), (40, 15)), segment((-15, 15), (-15, -5), origin="seam")

@@ -18,7 +18,8 @@ SLANT = 0.02  # sine of the tilt under which a cut face counts as square
 PARALLEL = 0.995
 BRIDGE = 80.0  # mm between two segments of one contact that are taken for pieces of one
 ON_LINE = 1.0  # mm across, of segments on one line
-TOUCHING = ("contact", "corner", "ground", "photo")  # origins of segments that the board reaches
+TOUCHING = ("contact", "corner", "ground")  # origins of segments that the board reaches
+PHOTO_SLACK = 3.0  # mm by which an edge that assembly saw in the photographs may be off: the outline tells it exactly
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +102,9 @@ def _shift(segment: ConstraintSegment, z: float) -> float:
 def _widest(segment: ConstraintSegment, others: Sequence[ConstraintSegment], thickness: float) -> Limit:
     """The segment where the material reaches furthest: two bevels on one stretch make a pointed end."""
     limit = Limit(segment.start, segment.end, segment.standard_error, segment.origin in TOUCHING)
+    if segment.origin == "photo":
+        out = PHOTO_SLACK * limit.inward
+        return replace(limit, start=limit.start - out, end=limit.end - out)
     if segment.normal is None or abs(segment.normal[2]) < SLANT:
         return limit
     partners = [o for o in others if o is not segment and _same_stretch(limit, o)]
