@@ -18,9 +18,10 @@ from kerfwright.refine.segment.appearance import fit_mixture, same_surface, with
 from kerfwright.refine.segment.boundary import Chain, chain_of, registration, snap
 from kerfwright.refine.segment.constraints import carve, fill_to_contacts, limits_of
 from kerfwright.refine.segment.edges import PITCH, EdgeScan, trace, view_offsets
-from kerfwright.refine.segment.evidence import cut_face_band, signed_distance
+from kerfwright.refine.segment.evidence import Bounds, cut_face_band, seeds_of, signed_distance
 from kerfwright.refine.segment.graphcut import cut, smoothness_weights
 from kerfwright.refine.segment.grid import Grid, grid_over
+from kerfwright.refine.segment.openings import open_seeds, openings
 from kerfwright.refine.segment.rectify import even_out
 from kerfwright.refine.segment.scene import BOARD, CLEAR, OCCLUDED, Occluders, slab_mesh
 from kerfwright.refine.segment.topology import clean, pieces
@@ -126,6 +127,28 @@ def test_pointed_end_stops_at_the_point() -> None:
     limits = limits_of([segment((10, 0), (10, 20), normal=up, depth=0.0),
                         segment((10, 0), (10, 20), normal=down, depth=8.0)], 8.0, 20)
     assert [limit.start[0] for limit in limits] == pytest.approx([14, 14], abs=0.1)
+
+
+def test_pieces_of_one_contact_exclude_what_lies_between_them() -> None:
+    first, second = segment((10, -15), (10, -5), contact=2), segment((10, 10), (10, 25), contact=2)
+    other = segment((10, 10), (10, 25), contact=3)
+    x, y = np.moveaxis(GRID.centres(), 2, 0)
+    between = (x > 10) & (y > -5) & (y < 10)
+    limits = limits_of([first, second], 10, 5)
+    assert carve(limits, GRID)[0][between].all()
+    assert [m.touching for m in limits] == [True, True, False]
+    assert not carve(limits_of([first, other], 10, 5), GRID)[0][between & (y > 0) & (y < 5)].any()
+
+
+def test_edge_seen_in_photographs_keeps_off_what_lies_beyond_but_not_the_exact_edge() -> None:
+    limits = limits_of([segment((10, -15), (10, 25), origin="photo")], 10, 5)
+    excluded, _ = carve(limits, GRID)
+    x, y = np.moveaxis(GRID.centres(), 2, 0)
+    beside = (y > -15) & (y < 25)
+    assert not excluded[beside & (x < 12.9)].any()
+    assert excluded[beside & (x > 13.1)].all()
+    points = np.array([[11.4, 0.0]])
+    assert (snap(points, np.array([0.2]), np.array([[1.0, 0.0]]), limits, 1.5)[0] == points).all()
 
 
 def test_board_is_run_on_to_its_contact_only() -> None:
@@ -256,10 +279,21 @@ def test_registration_recovers_a_moved_view() -> None:
     chain, shift = ring_chain(), np.array([0.9, -0.6])
     still = np.zeros(len(chain.ring))
     scans = [scan_at(still), scan_at(still), scan_at(still), scan_at(chain.normals @ shift)]
-    shifts, remains = registration(chain, scans)
+    shifts, remains, agrees = registration(chain, scans)
     assert np.linalg.norm(shifts[3] - shift) < 0.3 * np.linalg.norm(shift)  # the poses' own say holds it back
     assert abs(shifts[:3]).max() < 0.05
     assert np.nanmax(remains) < 0.2
+    assert agrees.min() > 0.4
+
+
+def test_view_that_shows_no_boundary_does_not_agree() -> None:
+    chain = ring_chain()
+    still = np.zeros(len(chain.ring))
+    elsewhere = EdgeScan(np.ones((len(still), 33)), np.ones(len(still)), scan_at(still).offsets)
+    for last in (elsewhere, scan_at(still + 2.4)):
+        _, _, agrees = registration(chain, [scan_at(still), scan_at(still), scan_at(still), last])
+        assert agrees[3] < 0.1
+    assert agrees[:3].min() > 1
 
 
 def test_chain_runs_round_material_on_the_left() -> None:
@@ -350,6 +384,69 @@ def test_constraints_must_match_the_sheets(tiny) -> None:
     capture, sheets, _ = tiny
     with pytest.raises(OptionError, match="constraints"):
         segment_boards(sheets, [[]], capture)
+
+
+# --- openings ---
+
+
+def views_of_a_hole(hole: np.ndarray, moves: bool) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Five views of wood with a patch: another colour in each of them, or the same dark one in all."""
+    rng = np.random.default_rng(3)
+    labs = []
+    for k in range(5):
+        lab = rng.normal([70, 8, 25], 1.0, (*GRID.shape, 3)).astype(np.float32)
+        lab[hole] = (25 + 14 * k * moves, 2, 5 + 5 * k * moves)
+        labs.append(lab)
+    return labs, [np.ones(GRID.shape, bool)] * 5
+
+
+def spread_points(mask: np.ndarray) -> np.ndarray:
+    return GRID.centres()[mask][::3]
+
+
+def test_hole_that_the_cloud_closed_is_opened() -> None:
+    board, hole = GRID.mask(box(-16, -16, 56, 36)), GRID.mask(box(5, 0, 30, 18))
+    labs, seen = views_of_a_hole(hole, moves=True)
+    found = openings(labs, seen, [1] * 5, board, spread_points(board & ~hole), GRID, 4.0)
+    assert (found & hole).sum() > 0.95 * hole.sum()
+    assert not (found & ~hole).any()
+
+
+def test_knot_and_shadow_look_alike_from_everywhere_and_stay() -> None:
+    board, knot = GRID.mask(box(-16, -16, 56, 36)), GRID.mask(box(5, 0, 30, 18))
+    labs, seen = views_of_a_hole(knot, moves=False)
+    assert not openings(labs, seen, [1] * 5, board, spread_points(board & ~knot), GRID, 4.0).any()
+
+
+def test_wood_that_the_cloud_shows_is_not_opened() -> None:
+    board, hidden = GRID.mask(box(-16, -16, 56, 36)), GRID.mask(box(5, 0, 30, 18))
+    labs, seen = views_of_a_hole(hidden, moves=True)
+    assert not openings(labs, seen, [1] * 5, board, spread_points(board), GRID, 4.0).any()
+
+
+def test_one_glossy_view_opens_nothing() -> None:
+    board, glint = GRID.mask(box(-16, -16, 56, 36)), GRID.mask(box(5, 0, 30, 18))
+    labs, seen = views_of_a_hole(glint, moves=False)
+    for lab in labs:
+        lab[glint] = (70, 8, 25)
+    labs[2][glint] = (98, 0, 0)
+    assert not openings(labs, seen, [1] * 5, board, spread_points(board & ~glint), GRID, 4.0).any()
+
+
+def test_open_at_the_rim_is_no_hole() -> None:
+    board, bay = GRID.mask(box(-16, -16, 56, 36)), GRID.mask(box(5, -20, 30, 18))
+    labs, seen = views_of_a_hole(bay, moves=True)
+    assert not openings(labs, seen, [1] * 5, board, spread_points(board & ~bay), GRID, 4.0).any()
+
+
+def test_opening_is_outside_and_its_edge_is_asked_for() -> None:
+    board, hole = GRID.mask(box(-16, -16, 56, 36)), GRID.mask(box(5, 0, 30, 18))
+    seeds = seeds_of(board, np.zeros_like(board), np.zeros_like(board), Bounds(4.0, 8.0), 1.0)
+    opened = open_seeds(seeds, hole, 1.0)
+    assert opened.outside[GRID.mask(box(9, 4, 26, 14))].all()
+    assert not opened.inside[GRID.mask(box(0, -5, 35, 23))].any()
+    assert seeds.inside[hole].all()
+    assert open_seeds(seeds, np.zeros_like(hole), 1.0) is seeds
 
 
 # --- views and exposure ---

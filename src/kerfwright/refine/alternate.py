@@ -52,8 +52,9 @@ def traced_pieces(
     found = segment_boards(assembly.sheets, assembly.constraints, capture, segmenting, free)
     pieces = []
     for sheet, segments, board in zip(assembly.sheets, assembly.constraints, found, strict=True):
+        known = segments if board.fallback else tuple(s for s in segments if s.origin != "photo")  # traced, and better
         for outline in board.outlines:
-            region = constrained_region(outline_region(outline), segments, diameter / 6, diameter / 20)
+            region = constrained_region(outline_region(outline), known, diameter / 6, diameter / 20)
             own = replace(sheet, region=region)
             pieces.append(Piece(_with_own_points(own, capture) if len(board.outlines) > 1 else own, outline))
     if options.use_images and options.use_seams:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from shapely import union_all
@@ -18,11 +19,12 @@ from kerfwright.capture.types import Capture
 from kerfwright.errors import OptionError
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.types import Sheet
-from kerfwright.refine.segment.boundary import Chain, chain_of, loops_of, registration, settle, snap
+from kerfwright.refine.segment.boundary import Chain, chain_of, loops_of, open_chain, registration, settle, snap
 from kerfwright.refine.segment.constraints import Limit, carve, fill_to_contacts, limits_of, margins
-from kerfwright.refine.segment.edges import EdgeScan, scan_edges
+from kerfwright.refine.segment.edges import EdgeScan, agreed_strength, scan_edges
 from kerfwright.refine.segment.evidence import (
     Bounds,
+    Seeds,
     ViewEvidence,
     average,
     backed_pixels,
@@ -36,9 +38,11 @@ from kerfwright.refine.segment.evidence import (
 )
 from kerfwright.refine.segment.graphcut import contrast, cut, smoothness_weights
 from kerfwright.refine.segment.grid import Grid, grid_over
+from kerfwright.refine.segment.openings import open_seeds, openings
 from kerfwright.refine.segment.options import BoardOutlines, SegmentOptions
 from kerfwright.refine.segment.rectify import Photos, even_out, rectify
 from kerfwright.refine.segment.scene import OCCLUDED, Occluders
+from kerfwright.refine.segment.straight import straightened
 from kerfwright.refine.segment.topology import clean, pieces
 from kerfwright.refine.segment.views import BoardView, choose_views
 from kerfwright.refine.types import Outline
@@ -47,6 +51,8 @@ __all__ = ["segment_boards"]
 
 CORNER_REACH = 2.0  # thicknesses over which an open corner between constraint segments is closed
 DISAGREES = 1.2  # mm that a registered view may still differ by from the others before it is left out
+LEAST_AGREEMENT = 0.1  # clearness of a view's boundary, in that of the others, below which it is left out; good views
+# against wood or in the dark have .17 and more
 LEAST_KNOWN = 0.5  # of a further piece's area that the rough outline had too
 LARGEST_SHIFT = 3.0  # mm; poses good to half a pixel need far less
 
@@ -69,11 +75,23 @@ class _Board:
     backed: np.ndarray  # pixels whose nearest place on the rough outline has a cut face or a contact
     rough: np.ndarray  # the mask before the first round
     free: np.ndarray  # pixels where cameras saw through the board's middle
+    face: np.ndarray  # (N, 2) the cloud's points on the sheet faces, mm
     left_out: tuple[str, ...] = ()
 
     @property
     def mask(self) -> np.ndarray:
         return np.any(self.masks, axis=0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Looks:
+    """What the photographs show of a board in one round, a list entry a view, all on the board's raster."""
+
+    labs: list[np.ndarray]
+    seen: list[np.ndarray]
+    kinds: list[np.ndarray]
+    cores: list[np.ndarray]  # seen, and inside for certain
+    sides: list[int]
 
 
 def segment_boards(
@@ -134,8 +152,9 @@ def _begin(
     cut_points = sheet.to_board(capture.cloud.points[sheet.cut_idx])[:, :2]
     backed = backed_pixels(mask, beyond, cut_points, grid, options.outline_error)
     seen_through = free_pixels(sheet, grid, free) if free else np.zeros(grid.shape, bool)
+    faces = np.concatenate([sheet.top_idx, sheet.bottom_idx])
     return _Board(idx, sheet, limits, grid, views, shifts, excluded, crossing, [mask], [sheet.region], beyond, backed,
-                  mask, seen_through & ~mask)
+                  mask, seen_through & ~mask, sheet.to_board(capture.cloud.points[faces])[:, :2])
 
 
 def _ground_covered(region: Polygon, limits: Sequence[Limit], reach: float) -> Polygon:
@@ -156,7 +175,10 @@ def _round(
     seeds = seeds_of(board.mask, board.beyond, forbidden, bounds, board.grid.pixel)
     if not seeds.inside.any():
         return replace(board, views=[], shifts=[])
-    evidences, contrasts = _evidence(board, seeds, error, occluders, photos, options)
+    looks = _look(board, seeds, error, occluders, photos)
+    opened = _opened(board, looks, options) if round_idx > 0 else np.zeros(board.grid.shape, bool)
+    seeds = open_seeds(seeds, opened, board.grid.pixel)
+    evidences, contrasts = _evidence(board, looks, opened, seeds, error, options)
     if not evidences:
         return replace(board, views=[], shifts=[])
     weights = smoothness_weights(contrasts, board.crossing, options.smoothness)
@@ -166,6 +188,11 @@ def _round(
         return replace(board, views=[], shifts=[])
     board = replace(board, masks=masks, regions=[pieces(m, board.grid) for m in masks])
     return _registered(board, occluders, photos, options)
+
+
+def _opened(board: _Board, looks: _Looks, options: SegmentOptions) -> np.ndarray:
+    """Openings that the rough outline does not know of; from the second round, when what hides the board is known."""
+    return openings(looks.labs, looks.seen, looks.sides, board.mask, board.face, board.grid, options.refined_error)
 
 
 def _own(masks: list[np.ndarray], rough: np.ndarray) -> list[np.ndarray]:
@@ -199,20 +226,30 @@ def _taken(board: _Board, boards: Sequence[_Board], error: float) -> np.ndarray:
     return taken
 
 
+def _look(
+    board: _Board, seeds: Seeds, error: float, occluders: Occluders, photos: Photos
+) -> _Looks:
+    """The board's views on its raster, exposure evened out, and what they see at each pixel."""
+    rectified = [rectify(photos, board.sheet, v, board.grid, s) for v, s in zip(board.views, board.shifts, strict=True)]
+    kinds = [classes_on_grid(board.sheet, board.idx, v, board.grid, occluders, error) for v in board.views]
+    cores = [seeds.inside & held & (k < OCCLUDED) for (_, held), k in zip(rectified, kinds, strict=True)]
+    sides = [v.side for v in board.views]
+    labs = even_out([image for image, _ in rectified], cores, sides)
+    seen = [held & (kind != OCCLUDED) for (_, held), kind in zip(rectified, kinds, strict=True)]
+    return _Looks(labs, seen, kinds, cores, sides)
+
+
 def _evidence(
-    board: _Board, seeds, error: float, occluders: Occluders, photos: Photos, options: SegmentOptions
+    board: _Board, looks: _Looks, opened: np.ndarray, seeds: Seeds, error: float, options: SegmentOptions
 ) -> tuple[list[ViewEvidence], np.ndarray]:
     """Every view's evidence, and the contrast averaged over the views that see a pixel."""
     rng = np.random.default_rng([options.seed, board.idx])
-    rectified = [rectify(photos, board.sheet, v, board.grid, s) for v, s in zip(board.views, board.shifts, strict=True)]
-    kinds = [classes_on_grid(board.sheet, board.idx, v, board.grid, occluders, error) for v in board.views]
-    cores = [seeds.inside & held & (k < 2) for (_, held), k in zip(rectified, kinds, strict=True)]
-    labs = even_out([image for image, _ in rectified], cores, [v.side for v in board.views])
-    seen = [held & (kind != OCCLUDED) for (_, held), kind in zip(rectified, kinds, strict=True)]
-    means = means_of_others(labs, seen, [v.side for v in board.views])
-    evidences, total, count = [], 0, 1e-6
-    for view, lab, mean, shown, kind, core in zip(board.views, labs, means, seen, kinds, cores, strict=True):
-        band = grown(cut_face_band(board.mask, view, board.grid), error / 2, board.grid.pixel) & ~seeds.inside
+    means = means_of_others(looks.labs, looks.seen, looks.sides)
+    evidences, total, count, solid = [], 0, 1e-6, board.mask & ~opened
+    for view, lab, mean, shown, kind, core in zip(
+        board.views, looks.labs, means, looks.seen, looks.kinds, looks.cores, strict=True
+    ):
+        band = grown(cut_face_band(solid, view, board.grid), error / 2, board.grid.pixel) & ~seeds.inside
         said = gather(lab, mean, shown, kind, band, seeds, options, rng)
         if said is not None:
             evidences.append(said)
@@ -240,10 +277,10 @@ def _registered(board: _Board, occluders: Occluders, photos: Photos, options: Se
     if len(board.views) < 3:
         return board
     chain = _chain(board, 0, options)
-    shifts, remains = registration(chain, _scans(board, chain, occluders, photos, options))
+    shifts, remains, agrees = registration(chain, _scans(board, chain, occluders, photos, options))
     moved = [old + new for old, new in zip(board.shifts, shifts, strict=True)]
-    keep = [k for k, (s, r) in enumerate(zip(moved, remains, strict=True))
-            if not r > DISAGREES and np.linalg.norm(s) < LARGEST_SHIFT]
+    keep = [k for k, (s, r, a) in enumerate(zip(moved, remains, agrees, strict=True))
+            if not r > DISAGREES and not a < LEAST_AGREEMENT and np.linalg.norm(s) < LARGEST_SHIFT]
     if len(keep) < 2:
         return board
     names = tuple(v.view.name for k, v in enumerate(board.views) if k not in keep)
@@ -267,12 +304,20 @@ def _finish(
 def _outline(
     board: _Board, k: int, capture: Capture, occluders: Occluders, photos: Photos, options: SegmentOptions
 ) -> Outline:
-    chain = _chain(board, k, options)
+    chain = chain_of(straightened(board.regions[k], partial(_shown, board, occluders, photos, options)), options.step)
     scans = _scans(board, chain, occluders, photos, options)
     cut_points = board.sheet.to_board(capture.cloud.points[board.sheet.cut_idx])[:, :2]
     offset, error = settle(chain, scans, cut_points, board.grid.pixel, options)
     points, error = snap(chain.moved(offset), error, chain.normals, board.limits, 2 * board.grid.pixel)
     return Outline(loops_of(chain, points, error), "images", len(board.views))
+
+
+def _shown(
+    board: _Board, occluders: Occluders, photos: Photos, options: SegmentOptions, points: np.ndarray
+) -> np.ndarray:
+    """How clearly the views together show an edge at (N, 2) points of an open line; NaN where none shows the place."""
+    chain = open_chain(points)
+    return agreed_strength(_scans(board, chain, occluders, photos, options))
 
 
 def _from_cloud(board: _Board, options: SegmentOptions) -> BoardOutlines:

@@ -9,14 +9,15 @@ import numpy as np
 from shapely.geometry import Polygon
 
 from kerfwright.refine.segment.constraints import Limit
-from kerfwright.refine.segment.edges import EdgeScan, trace, view_offsets
+from kerfwright.refine.segment.edges import EdgeScan, clearness, trace, view_offsets
 from kerfwright.refine.segment.options import SegmentOptions
 from kerfwright.refine.types import BoundaryLoop
 
-__all__ = ["Chain", "chain_of", "loops_of", "registration", "settle", "snap"]
+__all__ = ["Chain", "chain_of", "loops_of", "open_chain", "registration", "settle", "snap"]
 
 SMOOTH = 2.0  # mm along the boundary over which normals are averaged
 HUBER = 0.5  # mm
+LEAST_POINTS = 30  # boundary points that tell how a view lies
 PRIOR_POINTS = 40  # boundary points that the poses' own say is worth against the edges
 CLOUD_WINDOW = 3.0  # mm, along and across, in which cut-face points speak for a boundary point
 CLOUD_ERROR = 0.4  # mm that stereo drifts by, whatever the number of points
@@ -58,20 +59,46 @@ def _resampled(ring, step: float) -> tuple[np.ndarray, np.ndarray]:
     return points, np.column_stack([tangent[:, 1], -tangent[:, 0]])
 
 
-def registration(chain: Chain, scans: Sequence[EdgeScan]) -> tuple[np.ndarray, np.ndarray]:
-    """(V, 2) shift of each view against the others, mm in the plane; (V,) what remains after it (NaN: unknown)."""
+def open_chain(points: np.ndarray) -> Chain:
+    """(N, 2) points of an open line, material on its left, as a chain."""
+    reach = round(SMOOTH)
+    ends = np.pad(points, ((reach, reach), (0, 0)), mode="edge")
+    tangent = ends[2 * reach:] - ends[: -2 * reach]
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1), 1e-9)[:, None]
+    return Chain(points, np.column_stack([tangent[:, 1], -tangent[:, 0]]), np.zeros(len(points), int))
+
+
+def registration(chain: Chain, scans: Sequence[EdgeScan]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """How each view lies against the others.
+
+    Returns
+    -------
+    (V, 2) shift, mm in the plane; (V,) what remains after it, mm (NaN: unknown); (V,) how clearly the view shows the
+    boundary that all have in common, against the other views at the same places (NaN: too few places).
+    """
     path = trace(scans, chain.ring)
     offset, weight = (np.array(a) for a in zip(*(view_offsets(s, path) for s in scans), strict=True))
     mean = np.ma.median(np.ma.array(offset, mask=weight <= 0), axis=0).filled(0.0)
     shared = (weight > 0).sum(0) >= 3
     found = [_shift(chain.normals[u], (o - mean)[u], w[u]) for o, w in zip(offset, weight, strict=True)
              for u in [shared & (w > 0)]]
-    return np.array([f[0] for f in found]), np.array([f[1] for f in found])
+    return np.array([f[0] for f in found]), np.array([f[1] for f in found]), _agreement(scans, path)
+
+
+def _agreement(scans: Sequence[EdgeScan], path: np.ndarray) -> np.ndarray:
+    """(V,) clearness of each view's boundary over that of the others, where it and two others show it."""
+    weight = np.array([s.weight for s in scans])
+    clear = np.array([clearness(s, path) for s in scans])
+    rest, rest_weight = clear.sum(0) - clear, weight.sum(0) - weight
+    others = ((weight > 0).sum(0) - (weight > 0) >= 2) & (weight > 0)
+    usual = np.where(others, weight * rest / np.maximum(rest_weight, 1e-9), 0).sum(1)
+    enough = (others.sum(1) >= LEAST_POINTS) & (usual > 0)
+    return np.where(enough, np.where(others, clear, 0).sum(1) / np.maximum(usual, 1e-9), np.nan)
 
 
 def _shift(normals: np.ndarray, residual: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, float]:
     """The translation whose component along the normals is the residual, robustly; none from too few points."""
-    if len(residual) < 30:
+    if len(residual) < LEAST_POINTS:
         return np.zeros(2), float("nan")
     shift, ridge = np.zeros(2), PRIOR_POINTS * weight.mean() * np.eye(2)
     for _ in range(4):

@@ -16,7 +16,10 @@ __all__ = ["Limit", "carve", "fill_to_contacts", "limits_of", "margins", "neighb
 
 SLANT = 0.02  # sine of the tilt under which a cut face counts as square
 PARALLEL = 0.995
-TOUCHING = ("contact", "corner", "ground", "photo")  # origins of segments that the board reaches
+BRIDGE = 80.0  # mm between two segments of one contact that are taken for pieces of one
+ON_LINE = 1.0  # mm across, of segments on one line
+TOUCHING = ("contact", "corner", "ground")  # origins of segments that the board reaches
+PHOTO_SLACK = 3.0  # mm by which an edge that assembly saw in the photographs may be off: the outline tells it exactly
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +55,40 @@ def limits_of(segments: Sequence[ConstraintSegment], thickness: float, reach: fl
     """
     segments = [s for s in segments if np.linalg.norm(s.end - s.start) > 0]
     flat = [_widest(s, segments, thickness) for s in segments]
-    joined = [_extended(limit, flat, reach) for limit in flat]
+    joined = [*(_extended(limit, flat, reach) for limit in flat), *_bridges(segments, flat)]
     return [replace(limit, deep=_depth(limit, joined)) for limit in joined]
+
+
+def _bridges(segments: Sequence[ConstraintSegment], limits: Sequence[Limit]) -> list[Limit]:
+    """The gaps between segments of one contact on one line: the board need not reach it there, but cannot go beyond.
+
+    Contacts come in pieces where the rough outline is ragged.
+    """
+    found = []
+    for limit, follower, gap in _followers(segments, limits):
+        if gap < BRIDGE:
+            found.append(replace(limit, start=limit.end, end=follower.start, touching=False))
+    return found
+
+
+def _followers(
+    segments: Sequence[ConstraintSegment], limits: Sequence[Limit]
+) -> list[tuple[Limit, Limit, float]]:
+    """Each limit with the next one of its contact on its line, and the gap between the two, mm."""
+    pairs = []
+    for segment, limit in zip(segments, limits, strict=True):
+        ahead = []
+        for other_segment, other in zip(segments, limits, strict=True):
+            gap, across, _ = limit.local(other.start)
+            same = (other_segment.origin, other_segment.contact) == (segment.origin, segment.contact)
+            on_line = abs(across) < ON_LINE and limit.along @ other.along > PARALLEL
+            gap -= np.linalg.norm(limit.end - limit.start)
+            if other is not limit and same and on_line and gap > 0:
+                ahead.append((float(gap), other))
+        if ahead:
+            gap, follower = min(ahead, key=lambda found: found[0])
+            pairs.append((limit, follower, gap))
+    return pairs
 
 
 def _shift(segment: ConstraintSegment, z: float) -> float:
@@ -67,6 +102,9 @@ def _shift(segment: ConstraintSegment, z: float) -> float:
 def _widest(segment: ConstraintSegment, others: Sequence[ConstraintSegment], thickness: float) -> Limit:
     """The segment where the material reaches furthest: two bevels on one stretch make a pointed end."""
     limit = Limit(segment.start, segment.end, segment.standard_error, segment.origin in TOUCHING)
+    if segment.origin == "photo":
+        out = PHOTO_SLACK * limit.inward
+        return replace(limit, start=limit.start - out, end=limit.end - out)
     if segment.normal is None or abs(segment.normal[2]) < SLANT:
         return limit
     partners = [o for o in others if o is not segment and _same_stretch(limit, o)]

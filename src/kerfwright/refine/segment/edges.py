@@ -20,7 +20,7 @@ from kerfwright.refine.segment.rectify import Photos, pixels_at, sample
 from kerfwright.refine.segment.scene import BOARD, CLEAR, OCCLUDED, Occluders
 from kerfwright.refine.segment.views import BoardView
 
-__all__ = ["EdgeScan", "scan_edges", "trace", "view_offsets"]
+__all__ = ["EdgeScan", "agreed_strength", "clearness", "scan_edges", "trace", "view_offsets"]
 
 PITCH = 0.25  # mm between profile samples
 WINDOW = 1.5  # mm on each side whose mean colours are compared
@@ -30,6 +30,7 @@ AGAINST = {CLEAR: 1.0, BOARD: 0.35, OCCLUDED: 0.0}  # weight of an edge against 
 CLEAR_STEP = 5.0  # steps stronger than this, in units of the wood's own, mark an edge
 NEAR_PEAK = 1.0  # mm within which a view's own peak may differ from the traced boundary
 BEND = 0.15  # cost of a change of offset by one pitch from point to point
+AT_LINE = 0.75  # mm about a line within which an edge counts as on it
 FAR = 0.4  # cost of an offset at the end of the search
 
 
@@ -105,15 +106,35 @@ def _behind_itself(x_in_board: np.ndarray, board_view: BoardView, mask: np.ndarr
 
 def trace(scans: Sequence[EdgeScan], starts: np.ndarray) -> np.ndarray:
     """(N,) offset of the boundary that all views together like best, smooth along each loop."""
-    score = sum(np.log1p((s.strength / CLEAR_STEP) ** 2) * s.weight[:, None] for s in scans)
-    total = np.maximum(sum(s.weight for s in scans), 1.0)
+    score, total = _joint_score(scans)
     offsets = scans[0].offsets
-    cost = -score / total[:, None] + FAR * (offsets / offsets[-1]) ** 2
+    cost = -score / np.maximum(total, 1.0)[:, None] + FAR * (offsets / offsets[-1]) ** 2
     path = np.zeros(len(cost))
     for loop in np.unique(starts):
         rows = np.flatnonzero(starts == loop)
         path[rows] = offsets[_cheapest_loop(cost[rows])]
     return path
+
+
+def agreed_strength(scans: Sequence[EdgeScan]) -> np.ndarray:
+    """(N,) strength of the edge that all views together show on the line itself, NaN where none shows the place."""
+    score, total = _joint_score(scans)
+    on_line = abs(scans[0].offsets) <= AT_LINE
+    return np.where(total > 0, score[:, on_line].max(1) / np.maximum(total, 1e-9), np.nan)
+
+
+def clearness(scan: EdgeScan, path: np.ndarray) -> np.ndarray:
+    """(N,) how clear one view's edge is at (N,) offsets, by its weight; 0 beyond the profiles."""
+    column = np.round((path - scan.offsets[0]) / PITCH).astype(int)
+    held = (column >= 0) & (column < len(scan.offsets))
+    strength = scan.strength[np.arange(len(path)), column.clip(0, len(scan.offsets) - 1)]
+    return np.log1p((strength / CLEAR_STEP) ** 2) * scan.weight * held
+
+
+def _joint_score(scans: Sequence[EdgeScan]) -> tuple[np.ndarray, np.ndarray]:
+    """(N, K) sum over the views of how clear an edge is at each offset, (N,) sum of their weights."""
+    score = sum(np.log1p((s.strength / CLEAR_STEP) ** 2) * s.weight[:, None] for s in scans)
+    return score, sum(s.weight for s in scans)
 
 
 def _cheapest_loop(cost: np.ndarray) -> np.ndarray:
