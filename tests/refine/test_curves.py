@@ -184,3 +184,20 @@ def test_a_path_with_an_arc_shrunk_to_a_point_is_refused_not_a_crash():
     edges += [Arc(start=corners[2], mid=corners[2], end=corners[3]), Line(start=corners[3], end=corners[0])]
     with pytest.raises(StageError, match="collinear"):
         check_path(CutPath(outer=Loop(edges=tuple(edges))))
+
+
+def corner_missed(error):
+    """A rectangle one of whose corners was traced 12 mm beside itself, with the standard error given there."""
+    loop = boundary([(0, 0), (200, 0), (200, 70), (212, 85), (200, 100), (0, 100)], noise=0.2)
+    there = (loop.points[:, 0] > 190) & (loop.points[:, 1] > 66)
+    return BoundaryLoop(loop.points, np.where(there, error, loop.standard_error))
+
+
+def test_what_was_traced_in_doubt_is_left_out():
+    path = fit_cut_path([corner_missed(1.6)])
+    assert len(path.outer.edges) == 4
+    assert nearest_node(path.outer, (200, 100)) < 1.0
+
+
+def test_what_was_traced_for_sure_stays():
+    assert nearest_node(fit_cut_path([corner_missed(0.2)]).outer, (212, 85)) < 1.5

@@ -27,6 +27,7 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     from kerfwright.assemble.backs import measured_backs
     from kerfwright.assemble.constraints import constraint_segments
     from kerfwright.assemble.contacts import to_contact
+    from kerfwright.assemble.depths import remeasured
     from kerfwright.assemble.flush import flush_neighbours
     from kerfwright.assemble.gaps import mended
     from kerfwright.assemble.laid import laid_contacts, laid_on
@@ -43,6 +44,8 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     edges: tuple[tuple[ConstraintSegment, ...], ...] = tuple(() for _ in sheets)
     if options.rough:
         sheets, edges = unveiled(sheets, capture.cloud, photos, options)
+    else:
+        sheets = remeasured(sheets, capture.cloud, photos, parts.noise)
     sheets = measured_backs(sheets, photos, diameter, options)
     free = see_through(capture, parts.spacing, max(5 * parts.noise, diameter / 150))
     sheets = mended(sheets, capture.cloud, free, options)

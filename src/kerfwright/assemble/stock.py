@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kerfwright.assemble.faces import robust_mean
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.identify.types import Sheet
 from kerfwright.model import Origin, Quantity
@@ -16,7 +17,7 @@ __all__ = ["share_thickness", "with_thickness"]
 
 
 def share_thickness(sheets: tuple[Sheet, ...], diameter: float, options: AssembleOptions) -> tuple[Sheet, ...]:
-    """Sheets whose thicknesses agree within their uncertainty get their weighted mean; unseen ones take their twins',
+    """Sheets whose thicknesses agree within their uncertainty get their robust mean; unseen ones take their twins',
     or the commonest.
 
     The top sheet plane stays where it is: it was measured, the bottom follows.
@@ -28,8 +29,7 @@ def share_thickness(sheets: tuple[Sheet, ...], diameter: float, options: Assembl
     groups = _clusters(np.flatnonzero(seen), value, error, options.thickness_sigmas)
     out = list(sheets)
     for group in groups:
-        weight = error[group] ** -2
-        mean, spread = float(np.average(value[group], weights=weight)), float(weight.sum() ** -0.5)
+        mean, spread = robust_mean(value[group], error[group])
         origin = Origin.SHARED if len(group) > 1 else Origin.MEASURED
         for k in group:
             out[k] = with_thickness(sheets[k], Quantity(value=mean, standard_error=spread, origin=origin))

@@ -22,7 +22,7 @@ from kerfwright.identify.rims import Rim, cut_points, outline_samples
 from kerfwright.identify.types import Primitive
 
 __all__ = [
-    "ThicknessHypothesis", "from_cut_faces", "from_opposite", "from_photos", "reaches_ground",
+    "ThicknessHypothesis", "from_cut_faces", "from_opposite", "from_photos", "looking_at", "reaches_ground",
     "sharpened",
 ]
 
@@ -170,7 +170,7 @@ def from_photos(
     outward = np.c_[rim.outward[keep], np.zeros(len(keep))] @ frame[:3, :3].T
     normal = frame[:3, 2]
     offsets = np.arange(-4 * limits[0], limits[1], step)
-    visible = _looking_at(photos, places, outward, normal, most_views)
+    visible = looking_at(photos, places, outward, normal, most_views)
     if free is not None:
         visible = _unhidden(visible, free, places, normal, offsets)
     sweep = sweep_edge(photos, places, -normal, offsets, visible, smoothing=1.5 * step)
@@ -202,7 +202,7 @@ def reaches_ground(
     return bool(low.sum() > GROUND_SHARE * high.sum())
 
 
-def _looking_at(
+def looking_at(
     photos: Photos, places: np.ndarray, outward: np.ndarray, normal: np.ndarray, most_views: int
 ) -> np.ndarray:
     """(V, N) which views look at the cut face, neither grazing it nor along the sweep; the best views only."""

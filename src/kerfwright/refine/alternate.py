@@ -28,7 +28,7 @@ from kerfwright.refine.types import Outline
 __all__ = ["assembled_again", "traced_pieces"]
 
 # outlines from photographs are this much better than the cloud's
-EXACT = AssembleOptions(rough=False, outline_error=1 / 200, reach=1 / 60)
+EXACT = AssembleOptions(rough=False, outline_error=1 / 200, reach=1 / 60, thickness_floor=1 / 4000)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from kerfwright.refine.curves.shape import Shape
 from kerfwright.refine.curves.snap import GuideLine, is_bump
 from kerfwright.refine.curves.solve import Fit, solve
 
-__all__ = ["without_bumps"]
+__all__ = ["joined", "without_bumps"]
 
 
 def without_bumps(
@@ -32,7 +32,7 @@ def without_bumps(
         weight = samples.weight.copy()
         weight[np.arange(first, last if last >= first else last + samples.count) % samples.count] = 0.0
         samples = replace(samples, weight=weight)
-        fit = solve(_joined(fit.shape, k, count + 2, samples.count), samples, guides)
+        fit = solve(joined(fit.shape, k, count + 2, samples.count), samples, guides)
         places.append(place)
     return fit, samples, places
 
@@ -67,7 +67,7 @@ def _is_bump_between(shape: Shape, k: int, count: int, samples: Samples, options
     return is_bump(samples, first, last, direction, float(normal @ start), options)
 
 
-def _joined(shape: Shape, first: int, count: int, total: int) -> Shape:
+def joined(shape: Shape, first: int, count: int, total: int) -> Shape:
     """Edges first .. first + count - 1 as one line."""
     n = shape.count
     kept = [(first + count + i) % n for i in range(n - count)]

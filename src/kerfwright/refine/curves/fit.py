@@ -22,6 +22,7 @@ from kerfwright.refine.curves.search import improve
 from kerfwright.refine.curves.snap import GuideLine, Run, find_runs, guide_lines
 from kerfwright.refine.curves.solve import Fit, solve
 from kerfwright.refine.curves.start import first_shape
+from kerfwright.refine.curves.tidy import without_slivers, without_straight_nodes
 from kerfwright.refine.types import BoundaryLoop
 
 __all__ = ["fit_curves", "fit_cut_path"]
@@ -89,6 +90,7 @@ def _polished(
         return fits, ()
     chains = [i for i, fit in enumerate(fits) if fit.fit is not None]
     better, relations = polish([fits[i].fit for i in chains], [fits[i].samples for i in chains], guides, options)
+    better = [without_straight_nodes(f, fits[i].samples) for i, f in zip(chains, better, strict=True)]
     swapped = dict(zip(chains, better, strict=True))
     return [replace(fit, fit=swapped.get(i)) for i, fit in enumerate(fits)], relations
 
@@ -98,7 +100,7 @@ def _shifted(loop: BoundaryLoop, by: np.ndarray) -> BoundaryLoop:
 
 
 def _fit_loop(loop: BoundaryLoop, guides: list[GuideLine], options: CurveOptions) -> _LoopFit:
-    samples = resample(loop, options.correlation_length)
+    samples = resample(loop, options.correlation_length, options.doubtful)
     runs = find_runs(samples, guides, options)
     centre, radius, chi2 = fit_circle(samples)
     price = unit_price(samples, options)
@@ -110,7 +112,7 @@ def _fit_loop(loop: BoundaryLoop, guides: list[GuideLine], options: CurveOptions
     shape = first_shape(chain, samples, guides, options)
     fit = improve(solve(shape, samples, guides), samples, guides, options)
     fit, samples, bumps = without_bumps(fit, samples, guides, options)
-    return _LoopFit(samples, fit, None, tuple(bumps))
+    return _LoopFit(samples, without_slivers(fit, samples, guides, options), None, tuple(bumps))
 
 
 def _chain(samples: Samples, runs: list[Run], guides: list[GuideLine], options: CurveOptions) -> Chain:

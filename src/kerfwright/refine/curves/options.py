@@ -19,6 +19,9 @@ class CurveOptions:
     correlation_length : float
         Distance along the boundary over which its errors lose their memory (autocorrelation exp(-(d/l)^2)). Two
         correlation lengths of boundary count as one independent observation.
+    doubtful : float
+        Where standard errors are beyond this many times the usual one the photographs contradict each other: what was
+        traced there may be another edge, not this one with noise, and a path may leave it out for a bounded price.
     complexity : float
         Price of a degree of freedom, as a multiple of the Bayesian information criterion's ln(n).
     shortest_edge : float
@@ -45,6 +48,7 @@ class CurveOptions:
     """
 
     correlation_length: float = 5.0
+    doubtful: float = 2.0
     complexity: float = 1.0
     shortest_edge: float = 5.0
     snap_sigmas: float = 5.0

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.ndimage import binary_closing, binary_dilation, binary_opening
 
 from kerfwright.errors import StageError
 from kerfwright.refine.curves.prices import main_direction
@@ -14,6 +15,8 @@ from kerfwright.refine.types import BoundaryLoop
 __all__ = ["Samples", "resample"]
 
 MOST_SAMPLES = 2400
+RUN_ON = 3.0  # correlation lengths
+LEAST_WEIGHT = 0.05  # of a doubted sample, where only the others shall speak
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +24,7 @@ class Samples:
     """A closed boundary at even spacing along itself, mm.
 
     `weight` (N,) turns squared distances (mm2) into chi-square of effective observations: spacing / (2 l sigma^2)
-    with the correlation length l.
+    with the correlation length l. `doubted` (N,): what was traced there may be another edge.
     """
 
     points: np.ndarray  # (N, 2)
@@ -29,6 +32,7 @@ class Samples:
     weight: np.ndarray  # (N,)
     spacing: float
     correlation: float
+    doubted: np.ndarray
 
     @property
     def count(self) -> int:
@@ -65,6 +69,12 @@ class Samples:
         """Angle modulo 90 degrees along or across which most of the boundary runs."""
         return main_direction(self.directions(12.0))
 
+    @cached_property
+    def without_doubt(self) -> Samples:
+        """The same with next to no weight where the boundary is doubted."""
+        weight = np.where(self.doubted, LEAST_WEIGHT * self.weight, self.weight)
+        return replace(self, weight=weight) if self.doubted.any() else self
+
     def directions(self, reach: float) -> np.ndarray:
         """(N, 2) unit directions along the boundary from chords over +- `reach` mm."""
         k = self.steps(reach)
@@ -72,8 +82,10 @@ class Samples:
         return chord / np.maximum(np.linalg.norm(chord, axis=1, keepdims=True), 1e-12)
 
 
-def resample(loop: BoundaryLoop, correlation_length: float) -> Samples:
+def resample(loop: BoundaryLoop, correlation_length: float, doubtful: float = np.inf) -> Samples:
     """Samples about 1/5 of the correlation length apart, or as far as the boundary's own points if these are closer.
+
+    Those are doubted whose standard error is beyond `doubtful` times the usual one.
 
     Raises
     ------
@@ -101,7 +113,18 @@ def resample(loop: BoundaryLoop, correlation_length: float) -> Samples:
     even_sigma = np.interp(at, length, closed_sigma)
     correlation = max(correlation_length, native / 2)
     weight = length[-1] / count / (2 * correlation * even_sigma**2)
-    return Samples(even, even_sigma, weight, length[-1] / count, correlation)
+    doubted = _spread(even_sigma > doubtful * np.median(even_sigma), correlation / (length[-1] / count))
+    return Samples(even, even_sigma, weight, length[-1] / count, correlation, doubted)
+
+
+def _spread(doubted: np.ndarray, correlation: float) -> np.ndarray:
+    """Stretches that are doubted, without those shorter than twice the correlation length (in samples), run on beyond
+    their ends: where one leaves the true edge is not known, and beside it a constraint segment was run on too far.
+    """
+    near, far = max(1, round(correlation)), max(1, round(RUN_ON * correlation))
+    wide = np.pad(doubted, 4 * far, mode="wrap")
+    lasting = binary_opening(binary_closing(wide, np.ones(near + 1)), np.ones(2 * near + 1))
+    return binary_dilation(lasting, np.ones(2 * far + 1))[4 * far : -4 * far]
 
 
 def _distinct(points: np.ndarray, sigma: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from kerfwright.refine.curves.bumps import joined
 from kerfwright.refine.curves.chain import GUIDED, SPIKE, unit_price
 from kerfwright.refine.curves.options import CurveOptions
 from kerfwright.refine.curves.prices import CHEAPEST_LINE, edge_prices, line_prices
@@ -22,15 +23,22 @@ from kerfwright.refine.curves.shape import Shape, end_turn
 from kerfwright.refine.curves.snap import GuideLine
 from kerfwright.refine.curves.solve import Fit, solve
 from kerfwright.refine.curves.start import inner_unknowns
+from kerfwright.refine.curves.tidy import FARTHEST, do_cross, is_sound, without_edges
 
 __all__ = ["improve", "score"]
 
 MOST_TRIALS = 40
+UNSOUND = 1e9
 
 FILLET_REACH = 80.0  # mm that the nodes of a curve may move when it becomes a fillet
+TINY_WEIGHT = 1e-12  # that a stretch without any still has a middle
 SHORTEST_SIDE = 1e-6  # mm; of a line beside a fillet
 SHARPEST_FILLET = 0.1  # radians between lines below which their corner is nowhere
 LONGEST_SPLIT = 60.0  # mm: longer curves are no corners
+DROP = -2
+# Chi-square an observation: in 3 of 10 doubtful places any error up to 20 mm is as likely as another, in the others it
+# is normal, of 2 mm (4.5); and what was mistaken was so over twice the length that noise is correlated over.
+DOUBTED_MOST = 2.25
 MOST_TURN = 0.7  # radians: a sharp node that turns more is not tried smooth
 
 
@@ -38,7 +46,8 @@ MOST_TURN = 0.7  # radians: a sharp node that turns more is not tried smooth
 class _Move:
     """Edges first .. first + count - 1 (round the loop) become one edge of a kind.
 
-    With no edges node `first` becomes smooth; with `split`, samples, edge `first` becomes lines that meet there.
+    With no edges node `first` becomes smooth; with `split`, samples, edge `first` becomes lines that meet there. DROP
+    takes the edges out: the lines on both sides meet, or become one.
     """
 
     first: int
@@ -51,7 +60,14 @@ class _Move:
 def score(fit: Fit, samples: Samples, options: CurveOptions) -> float:
     """Chi-square and the price of the structure: what is minimised."""
     price = charges(fit.shape, samples).sum() - sum(fit.shape.smooth)
-    return fit.chi2 + unit_price(samples, options) * float(price)
+    return believed_chi2(fit, samples) + unit_price(samples, options) * float(price)
+
+
+def believed_chi2(fit: Fit, samples: Samples) -> float:
+    """Chi-square, limited where the boundary is doubted: errors there come out of a mixture with wide tails."""
+    each = samples.weight * fit.distance**2
+    most = DOUBTED_MOST * samples.spacing / (2 * samples.correlation)
+    return float(np.where(samples.doubted, np.minimum(each, most), each).sum())
 
 
 def charges(shape: Shape, samples: Samples) -> np.ndarray:
@@ -67,7 +83,7 @@ def charges(shape: Shape, samples: Samples) -> np.ndarray:
 
 def improve(fit: Fit, samples: Samples, guides: list[GuideLine], options: CurveOptions) -> Fit:
     """Take moves that lower the score until none does."""
-    best, trials, tried = score(fit, samples, options), 0, set()
+    best, trials, tried = _value(fit, samples, options), 0, set()
     while trials < MOST_TRIALS:
         for move in _moves(fit, samples, options):
             key = _key(fit.shape, move)
@@ -76,18 +92,18 @@ def improve(fit: Fit, samples: Samples, guides: list[GuideLine], options: CurveO
             tried.add(key)
             trials += 1
             trial = solve(_applied(fit.shape, move, samples), samples, guides, steps=20)
-            if score(trial, samples, options) < best - 1e-6 and not _has_spike(trial.shape):
+            if _value(trial, samples, options) < best - 1e-6:
                 fit = settled(trial, samples, guides)
-                best = score(fit, samples, options)
+                best = _value(fit, samples, options)
                 break
         else:
             return fit
     return fit
 
 
-def _has_spike(shape: Shape) -> bool:
-    """Whether the path turns back on itself at a node, which no saw can cut."""
-    return any(abs(end_turn(shape, k)) > SPIKE for k in range(shape.count))
+def _value(fit: Fit, samples: Samples, options: CurveOptions) -> float:
+    """The score; of a path that cannot be cut, more than that of any other."""
+    return score(fit, samples, options) + (0.0 if is_sound(fit.shape, samples) else UNSOUND)
 
 
 def settled(fit: Fit, samples: Samples, guides: list[GuideLine]) -> Fit:
@@ -123,6 +139,7 @@ def _key(shape: Shape, move: _Move) -> tuple:
 
 def _moves(fit: Fit, samples: Samples, options: CurveOptions) -> list[_Move]:
     found = [*_smoothings(fit, samples, options), *_merges(fit, samples, options), *_splits(fit, samples, options)]
+    found += _drops(fit, samples, options)
     return sorted((m for m in found if m.gain > 0), key=lambda m: (-m.gain, m.first, m.count, m.kind))
 
 
@@ -140,7 +157,7 @@ def _merges(fit: Fit, samples: Samples, options: CurveOptions) -> Iterator[_Move
     """One, two or three edges as one of any kind, where a free fit of their range promises a lower score."""
     shape, price = fit.shape, unit_price(samples, options)
     now = np.bincount(fit.edge, samples.weight * fit.distance**2, minlength=shape.count)
-    charge = charges(shape, samples)
+    charge, sure = charges(shape, samples), samples.without_doubt
     for count in (1, 2, 3):
         if shape.count - count < 1:
             continue
@@ -156,11 +173,36 @@ def _merges(fit: Fit, samples: Samples, options: CurveOptions) -> Iterator[_Move
                     continue
                 gain = (
                     paid
-                    - fit_range(samples, *_believed(span, shape, first, count, kind), kind)
+                    - fit_range(sure, *_believed(span, shape, first, count, kind), kind)
                     - price * _least(kind)
                     + price * _allowance(shape, first, count, kind, samples)
                 )
                 yield _Move(first, count, kind, gain)
+
+
+def _drops(fit: Fit, samples: Samples, options: CurveOptions) -> Iterator[_Move]:
+    """One to three edges between lines that follow a boundary which is doubted for the most part."""
+    shape, price = fit.shape, unit_price(samples, options)
+    charge = charges(shape, samples)
+    for count in (1, 2, 3):
+        for first in range(shape.count if shape.count - count >= 3 else 0):
+            edges = [(first + i) % shape.count for i in range(count)]
+            span = _span(shape, first, count, samples.count)
+            inside = samples.doubted[np.arange(span[0], span[1] + 1) % samples.count]
+            known = any(shape.lines[k] >= 0 for k in edges)
+            if not known and inside.mean() > 0.5 and _can_close(shape, first - 1, first + count):
+                saved = sum(charge[k] - shape.smooth[k] for k in edges)
+                yield _Move(first, count, DROP, price * float(saved) - DOUBTED_MOST * _observations(inside, samples))
+
+
+def _observations(chosen: np.ndarray, samples: Samples) -> float:
+    return float(chosen.sum()) * samples.spacing / (2 * samples.correlation)
+
+
+def _can_close(shape: Shape, before: int, after: int) -> bool:
+    """Whether two edges are lines that cross, or may be one."""
+    a, b = before % shape.count, after % shape.count
+    return do_cross(shape, a, b) or (shape.kinds[a] == shape.kinds[b] == LINE and shape.lines[a] == shape.lines[b])
 
 
 def _splits(fit: Fit, samples: Samples, options: CurveOptions) -> Iterator[_Move]:
@@ -236,6 +278,11 @@ def _applied(shape: Shape, move: _Move, samples: Samples) -> Shape:
         return Shape(shape.unknowns, shape.kinds, shape.lines, smooth, shape.ranges)
     if move.split:
         return _cut_up(shape, move, samples)
+    if move.kind == DROP:
+        before, after = (move.first - 1) % shape.count, (move.first + move.count) % shape.count
+        if do_cross(shape, before, after):
+            return without_edges(shape, move.first, move.count, samples.count)
+        return joined(shape, before, move.count + 2, samples.count)
     n = shape.count
     order = [(move.first + i) % n for i in range(n)]
     kept = order[move.count :]
@@ -245,6 +292,8 @@ def _applied(shape: Shape, move: _Move, samples: Samples) -> Shape:
     ranges = (_span(shape, move.first, move.count, samples.count), *(shape.ranges[k] for k in kept))
     smooth = tuple(shape.smooth[k] and not _both_lines(kinds, i) for i, k in enumerate(starts))
     nodes = [shape.node(k) for k in starts]
+    if move.kind == LINE and len(starts) > 2:
+        nodes[0], nodes[1] = _line_ends(nodes[:2], kept[-1], kept[0], shape, samples.without_doubt, ranges[0])
     fillet = _fillet(shape, move, samples) if move.kind == ARC and smooth[0] and smooth[1 % len(smooth)] else None
     if fillet is not None:
         nodes[0], nodes[1], bulge = fillet
@@ -254,6 +303,26 @@ def _applied(shape: Shape, move: _Move, samples: Samples) -> Shape:
     inner += [shape.unknowns[shape.extra(k)].tolist() for k in kept]
     applied = Shape(np.concatenate([*nodes, *map(np.array, inner)]), kinds, lines, smooth, ranges)
     return applied if fillet is None else _with_ranges(applied, samples, FILLET_REACH)
+
+
+def _line_ends(
+    nodes: list[np.ndarray], before: int, after: int, shape: Shape, samples: Samples, span: tuple[int, int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where the best line through a stretch meets the lines on both sides of it, or passes the nodes there."""
+    at = np.arange(span[0], span[1] + 1) % samples.count
+    middle = np.average(samples.points[at], axis=0, weights=samples.weight[at] + TINY_WEIGHT)
+    spread = (samples.points[at] - middle) * np.sqrt(samples.weight[at] + TINY_WEIGHT)[:, None]
+    along = np.linalg.svd(spread, full_matrices=False)[2][0]
+    ends = []
+    for node, beside in zip(nodes, (before, after), strict=True):
+        foot = middle + along * ((node - middle) @ along)
+        other = shape.node(beside + 1) - shape.node(beside)
+        system = np.column_stack([along, -other / max(float(np.linalg.norm(other)), 1e-9)])
+        if shape.kinds[beside] == LINE and abs(np.linalg.det(system)) > SHARPEST_FILLET:
+            crossing = middle + along * np.linalg.solve(system, shape.node(beside) - middle)[0]
+            foot = crossing if np.linalg.norm(crossing - node) < FARTHEST else foot
+        ends.append(foot)
+    return ends[0], ends[1]
 
 
 def _fillet(shape: Shape, move: _Move, samples: Samples) -> tuple[np.ndarray, np.ndarray, float] | None:
