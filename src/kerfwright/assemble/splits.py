@@ -100,7 +100,12 @@ def _seam_places(change: Discontinuity, across: np.ndarray, margin: float) -> li
 
 
 def _agreed(shares: list[float]) -> bool:
-    return len(shares) >= LEAST_VIEWS and float(np.mean(shares)) >= LEAST_AGREEMENT
+    """Whether the views show the change: several each for itself, and all on the mean. A glint shows in one."""
+    return _showing(shares) >= LEAST_VIEWS and float(np.mean(shares)) >= LEAST_AGREEMENT
+
+
+def _showing(shares: list[float]) -> int:
+    return sum(share > LEAST_ALONG for share in shares)
 
 
 def _seam(change: Discontinuity, k: int, m: np.ndarray, ring: np.ndarray, diameter: float) -> SeamLine:
@@ -112,7 +117,7 @@ def _seam(change: Discontinuity, k: int, m: np.ndarray, ring: np.ndarray, diamet
     weight = np.maximum(strength[near] - 1, 1e-9)
     at = float(change.offsets[near] @ weight / weight.sum()) + apart / 2
     start, end = at * m + np.array([[along.min()], [along.max()]]) * np.array([-m[1], m[0]])
-    views = sum(share > LEAST_ALONG for share in change.views(k))
+    views = _showing(change.views(k))
     return SeamLine(m, at, start, end, float(strength[k]), views, abs(apart) * GAP_SHARE)
 
 
