@@ -5,7 +5,7 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from kerfwright.model import Bezier, Line, Loop, Model
+from kerfwright.model import Bezier, Contact, Line, Loop, Model
 from kerfwright.model.clip import ConvexArea, clipped_loop
 from kerfwright.model.frames import rows
 from kerfwright.model.geometry import edge_length, edge_points, loop_distance, reverse_edge, signed_area
@@ -87,6 +87,19 @@ def test_only_what_lies_in_a_neighbour_is_cut_off():
     points = np.concatenate([edge_points(e, np.linspace(0, 1, 50)) for e in shelf.cut_path.outer.edges])
     beside = (points[:, 1] < 29) | (points[:, 1] > 71)
     assert loop_distance(outline, points[beside]).max() < 0.01 and points[:, 0].max() > 200.09
+
+
+def test_boards_glued_edge_to_edge_still_touch():
+    left = board(rectangle(200.03, 100), "left", 16.0)
+    right = board(rectangle(150, 100), "right", 16.0, placed(at=(200, 0, 0)))
+    glued = Contact(
+        type=4, a="left", b="right", face_a="edge", face_b="edge", point=(200, 50, 8), normal=(1, 0, 0),
+        interface=(((200, 0, 0), (200, 100, 0), (200, 100, 16), (200, 0, 16)),), area=1600, angle=0,
+    )  # fmt: skip
+    trimmed = fitted_together(Model(boards=(left, right), contacts=(glued,)))
+    assert overlap(trimmed) == pytest.approx(0, abs=1e-6)
+    assert trimmed.contacts[0].area == pytest.approx(1600)
+    assert not [f for f in check(trimmed) if f.code in ("K111", "K201", "K210")]
 
 
 def test_contacts_tell_what_the_solids_meet_on():

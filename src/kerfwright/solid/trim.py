@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ["TrimOptions", "fitted_together"]
 
+ENDING = (1, 2)  # types of contact at which b ends on a's sheet
 PROBES = np.linspace(0, 1, 129)  # where an edge is asked how deep it runs into a neighbour
 MOST_CUTS = 8  # of a pair: a board seldom runs into another in more places
 
@@ -63,9 +64,9 @@ def fitted_together(model: Model, options: TrimOptions | None = None) -> Model:
     options = (options or TrimOptions()).of_size(_size(model))
     boards = _without_slits(model, options.slit)
     shapes = dict(_shapes(boards.values()))
-    ending = {frozenset((c.a, c.b)): c for c in model.contacts if c.type in (1, 2)}
+    meeting = {frozenset((c.a, c.b)): c for c in model.contacts}
     for a, b in near_pairs(list(shapes.values()), 0.0):
-        contact = ending.get(frozenset((a.name, b.name)))
+        contact = meeting.get(frozenset((a.name, b.name)))
         for _ in range(MOST_CUTS):
             ways = _yielding(shapes[a.name], shapes[b.name], contact)
             tried = (_trimmed(boards, shapes[name], shapes[other], contact, options) for name, other in ways)
@@ -122,7 +123,7 @@ def _measured(contact: Contact, options: TrimOptions, shapes: dict[str, Shape]) 
 
 def _yielding(a: Shape, b: Shape, contact: Contact | None) -> list[tuple[str, str]]:
     """Which of two boards is to be trimmed, and the other: the one that ends there, else the smaller one first."""
-    if contact is not None:
+    if contact is not None and contact.type in ENDING:
         return [(contact.b, contact.a)]
     small, large = sorted((a, b), key=lambda shape: shape.solid.volume)
     return [(small.name, large.name), (large.name, small.name)]
@@ -176,7 +177,7 @@ def _areas(
     board: Board, other: Shape, shared: list[Shape], contact: Contact | None, options: TrimOptions
 ) -> Iterator[ConvexArea]:
     """What to take off the board: all beyond the sheet that it ends on, or only what lies in the other."""
-    if contact is not None:
+    if contact is not None and contact.type in ENDING:
         normal, outline = np.array(contact.normal), sample_loop(board.cut_path.outer)
         for face in other.faces:
             if face.normal @ normal > np.cos(np.radians(options.tilt)) and (line := _line(board, face)):
