@@ -18,7 +18,7 @@ from kerfwright.refine.segment.appearance import fit_mixture, same_surface, with
 from kerfwright.refine.segment.boundary import Chain, chain_of, registration, snap
 from kerfwright.refine.segment.constraints import carve, fill_to_contacts, limits_of
 from kerfwright.refine.segment.edges import PITCH, EdgeScan, trace, view_offsets
-from kerfwright.refine.segment.evidence import Bounds, cut_face_band, seeds_of, signed_distance
+from kerfwright.refine.segment.evidence import Bounds, behind_cut_faces, cut_face_band, seeds_of, signed_distance
 from kerfwright.refine.segment.graphcut import cut, smoothness_weights
 from kerfwright.refine.segment.grid import Grid, grid_over
 from kerfwright.refine.segment.openings import open_seeds, openings
@@ -470,3 +470,15 @@ def test_views_are_picked_until_all_is_seen_and_no_more_than_allowed(tiny) -> No
         assert len(views) <= allowed
         assert len({v.view.name for v in views}) == len(views)
     assert {v.side for v in views} == {1, -1}
+
+
+def test_wood_right_behind_cut_faces_is_certain():
+    """Points on the right edge, and on a step 6 mm inside of the left one: only the right edge is where it seems."""
+    grid = Grid(np.zeros(2), 1.0, (60, 80))
+    mask = grid.mask(box(10, 10, 70, 50))
+    along = np.linspace(12, 48, 60)
+    points = np.concatenate([np.c_[np.full(60, x), along] for x in (69.8, 16.0)])
+    walled = behind_cut_faces(mask, points, grid, 2.5)
+    assert walled[30, 60] and walled[30, 66] and not walled[30, 69]
+    assert not walled[30, 14] and not walled[30, 20]
+    assert not behind_cut_faces(mask, points[:3], grid, 2.5).any()

@@ -28,6 +28,7 @@ from kerfwright.refine.segment.evidence import (
     ViewEvidence,
     average,
     backed_pixels,
+    behind_cut_faces,
     classes_on_grid,
     cut_face_band,
     free_pixels,
@@ -73,6 +74,7 @@ class _Board:
     regions: list[Polygon]  # the same as polygons
     beyond: np.ndarray  # just past the segments it is known to touch: there the outline's error has no say
     backed: np.ndarray  # pixels whose nearest place on the rough outline has a cut face or a contact
+    walled: np.ndarray  # pixels close behind cut faces: wood for certain
     rough: np.ndarray  # the mask before the first round
     free: np.ndarray  # pixels where cameras saw through the board's middle
     face: np.ndarray  # (N, 2) the cloud's points on the sheet faces, mm
@@ -151,10 +153,11 @@ def _begin(
     beyond = grid.mask(margins(limits, 2 * options.outline_error))
     cut_points = sheet.to_board(capture.cloud.points[sheet.cut_idx])[:, :2]
     backed = backed_pixels(mask, beyond, cut_points, grid, options.outline_error)
+    walled = behind_cut_faces(mask, cut_points, grid, options.cut_face_error)
     seen_through = free_pixels(sheet, grid, free) if free else np.zeros(grid.shape, bool)
     faces = np.concatenate([sheet.top_idx, sheet.bottom_idx])
     return _Board(idx, sheet, limits, grid, views, shifts, excluded, crossing, [mask], [sheet.region], beyond, backed,
-                  mask, seen_through & ~mask, sheet.to_board(capture.cloud.points[faces])[:, :2])
+                  walled, mask, seen_through & ~mask, sheet.to_board(capture.cloud.points[faces])[:, :2])
 
 
 def _ground_covered(region: Polygon, limits: Sequence[Limit], reach: float) -> Polygon:
@@ -177,6 +180,7 @@ def _round(
         return replace(board, views=[], shifts=[])
     looks = _look(board, seeds, error, occluders, photos)
     opened = _opened(board, looks, options) if round_idx > 0 else np.zeros(board.grid.shape, bool)
+    seeds = replace(seeds, inside=seeds.inside | board.walled & ~forbidden)
     seeds = open_seeds(seeds, opened, board.grid.pixel)
     evidences, contrasts = _evidence(board, looks, opened, seeds, error, options)
     if not evidences:

@@ -16,9 +16,8 @@ from kerfwright.refine.segment.scene import BOARD, CLEAR, Occluders
 from kerfwright.refine.segment.views import BoardView
 
 __all__ = [
-    "Bounds", "Seeds", "ViewEvidence", "average", "backed_pixels", "classes_on_grid", "cut_face_band", "free_pixels",
-    "gather", "grown", "means_of_others",
-    "seeds_of", "signed_distance",
+    "Bounds", "Seeds", "ViewEvidence", "average", "backed_pixels", "behind_cut_faces", "classes_on_grid",
+    "cut_face_band", "free_pixels", "gather", "grown", "means_of_others", "seeds_of", "signed_distance",
 ]
 
 STRIDE = 3  # rays are cast for every third pixel: outlines of occluders are no better than that
@@ -28,6 +27,8 @@ PRIOR_REACH = 3.0  # outline errors
 LEAST_TRUST = 0.15
 NEAR_OUTLINE = 40.0  # mm
 BACKING = 4  # cut-face points by a place on the outline that back it
+WALLED = 8  # cut-face points that show where a board ends, whatever the photographs say
+MOSTLY = 0.7  # share of the cut-face points about that must lie on the outline
 PARALLAX_CAP = 1.5  # nats from colours that agree, or not, between views
 LEAST_PARALLAX = 500  # pixels to learn that from
 
@@ -96,6 +97,31 @@ def backed_pixels(
         backed[tuple(edge[near >= BACKING].T)] = True
     nearest = np.where(mask, *(distance_transform_edt(m, return_indices=True)[1] for m in (mask, ~mask)))
     return backed[tuple(nearest)]
+
+
+def behind_cut_faces(mask: np.ndarray, cut_points: np.ndarray, grid: Grid, within: float) -> np.ndarray:
+    """Pixels of the mask more than `within` mm behind places of its outline on which cut-face points lie, nearly all of
+    those about: what stereo saw from outside is wood right up to there, however the light falls on it.
+
+    cut_points (N, 2) mm in the board's plane.
+    """
+    from scipy.ndimage import distance_transform_edt
+    from scipy.spatial import cKDTree
+
+    walled = np.zeros(mask.shape, bool)
+    if not mask.any() or len(cut_points) < WALLED:
+        return walled
+    distance = signed_distance(mask, grid.pixel)
+    exact = np.abs(grid.lookup(distance, cut_points, np.inf)) < within
+    edge = np.argwhere(abs(distance) < 1.5 * grid.pixel)
+    places = grid.to_xy(edge[:, ::-1])
+    about, on = (
+        cKDTree(points).query_ball_point(places, 3 * within, return_length=True) if len(points) else np.zeros(len(edge))
+        for points in (cut_points, cut_points[exact])
+    )
+    walled[tuple(edge[(on >= WALLED) & (on >= MOSTLY * about)].T)] = True
+    nearest = distance_transform_edt(mask, return_indices=True)[1]
+    return mask & (distance > within) & walled[tuple(nearest)]
 
 
 def free_pixels(sheet: Sheet, grid: Grid, free: FreeSpace) -> np.ndarray:

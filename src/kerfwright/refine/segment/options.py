@@ -26,6 +26,7 @@ class SegmentOptions:
     search_margin: float = 24.0  # how far beyond the rough outline the board may reach
     unbacked_error: float = 24.0  # the same two where no cut face and no contact backs the outline: stereo spans dark
     unbacked_margin: float = 80.0  # openings with a veil, and loses dark wood
+    cut_face_error: float = 2.5  # ... and where cut faces lie right on it: fringe and eased edges
     contact_reach: float = 250.0  # a board known to touch another may be missing up to there: it is dark in corners
     refined_error: float = 4.0  # the same, of a mask after the first round
     components: int = 5  # of a colour mixture
