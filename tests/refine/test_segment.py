@@ -482,3 +482,12 @@ def test_wood_right_behind_cut_faces_is_certain():
     assert walled[30, 60] and walled[30, 66] and not walled[30, 69]
     assert not walled[30, 14] and not walled[30, 20]
     assert not behind_cut_faces(mask, points[:3], grid, 2.5).any()
+
+
+def test_a_tongue_of_fringe_is_not_certain():
+    grid = Grid(np.zeros(2), 1.0, (100, 120))
+    mask = grid.mask(box(10, 10, 90, 90) | box(90, 40, 102, 52))
+    ends = np.linspace(40, 52, 30)
+    points = np.concatenate([np.c_[np.full(30, 102.0), ends], np.c_[np.full(60, 90.0), np.linspace(12, 36, 60)]])
+    walled = behind_cut_faces(mask, points, grid, 2.5)
+    assert walled[25, 80] and not walled[46, 97]

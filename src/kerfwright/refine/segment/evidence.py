@@ -28,6 +28,7 @@ LEAST_TRUST = 0.15
 NEAR_OUTLINE = 40.0  # mm
 BACKING = 4  # cut-face points by a place on the outline that back it
 WALLED = 8  # cut-face points that show where a board ends, whatever the photographs say
+TONGUE = 12.0  # mm; stereo's fringe makes tongues narrower than twice this
 MOSTLY = 0.7  # share of the cut-face points about that must lie on the outline
 PARALLAX_CAP = 1.5  # nats from colours that agree, or not, between views
 LEAST_PARALLAX = 500  # pixels to learn that from
@@ -121,7 +122,8 @@ def behind_cut_faces(mask: np.ndarray, cut_points: np.ndarray, grid: Grid, withi
     )
     walled[tuple(edge[(on >= WALLED) & (on >= MOSTLY * about)].T)] = True
     nearest = distance_transform_edt(mask, return_indices=True)[1]
-    return mask & (distance > within) & walled[tuple(nearest)]
+    broad = grown(grown(mask, -TONGUE, grid.pixel), TONGUE, grid.pixel)
+    return mask & broad & (distance > within) & walled[tuple(nearest)]
 
 
 def free_pixels(sheet: Sheet, grid: Grid, free: FreeSpace) -> np.ndarray:
