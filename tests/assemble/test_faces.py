@@ -7,7 +7,7 @@ import pytest
 
 from clouds import pose, sheet
 from kerfwright.assemble.depths import _between, _easing, _Edges, _far_edge, _settled
-from kerfwright.assemble.faces import Faces, measured_faces, robust_mean, stereo_bias
+from kerfwright.assemble.faces import Faces, believed, measured_faces, robust_mean, stereo_bias
 from kerfwright.capture.types import Cloud
 
 SIZE = 500.0
@@ -59,6 +59,15 @@ def test_what_well_seen_faces_say_of_stereo_is_their_common_bias():
     assert bias == pytest.approx(-0.4)
     assert scatter == pytest.approx(0.1)
     assert stereo_bias(seen[:1], stereo[:1], 0.1) == (0.0, 0.2)  # one face is not enough
+
+
+def test_grain_that_lies_off_a_face_s_points_is_not_believed():
+    """The others stand off by .4; a shadow across the third face agrees between views 1.4 below its points."""
+    seen = [[(-0.4, 0.05), None], [(-0.45, 0.05), None], [(-1.4, 0.09), None], [None, (-1.4, 0.09)]]
+    stereo = [[(0.0, 0.05), None], [(0.0, 0.05), None], [(0.0, 0.1), None], [None, None]]
+    kept = believed(seen, stereo, -0.4, 0.1)
+    assert [row[0] is None for row in kept] == [False, False, True, True]
+    assert kept[3][1] == (-1.4, 0.09)  # nothing speaks against it
 
 
 def test_an_outlier_hardly_moves_the_robust_mean():

@@ -48,7 +48,7 @@ def assert_is_table(sheets):
     assert [round(s.thickness.value) for s in sheets] == [18, 18, 18]
     assert abs(sheets[0].normal[2]) > 0.999
     assert [abs(s.normal[0]) > 0.999 for s in sheets[1:]] == [True, True]
-    assert [s.region.area for s in sheets] == pytest.approx([60000, 32000, 32000], rel=0.03)
+    assert [s.region.area for s in sheets] == pytest.approx([60000, 32000, 32000], rel=0.05)  # a row of cells is 4 %
 
 
 def test_one_board(board):

@@ -19,7 +19,7 @@ from kerfwright.capture.types import Cloud
 from kerfwright.identify.photo_edges import Photos, refine_peak
 from kerfwright.identify.types import Sheet
 
-__all__ = ["Faces", "measured_faces", "robust_mean", "stereo_bias"]
+__all__ = ["Faces", "believed", "measured_faces", "robust_mean", "stereo_bias"]
 
 WINDOW, SPACING = 1 / 31, 1 / 625  # of D: side of a window of grain, and between places that are read in it
 WINDOWS, VIEWS, LEAST_VIEWS = 30, 7, 4
@@ -31,6 +31,7 @@ LEAST_WINDOWS = 3
 BEST_ERROR, WORST_ERROR = 1 / 10000, 1 / 2000  # of D: of one face; a worse measurement is none
 LEAST_POINTS = 100
 STEREO_SHARE = 0.5  # of the spread of a face's points, by which dim faces are shifted, whatever the number of points
+ASTRAY = 4.0  # standard errors between grain and stereo beyond which the grain is not this face's
 LEAST_FACES = 2  # that must agree on a bias of stereo
 
 
@@ -55,6 +56,7 @@ def measured_faces(sheets: Sequence[Sheet], cloud: Cloud, photos: Photos, noise:
     seen = [[_grain_offset(s, side, photos, size) for side in (0, 1)] for s in sheets]
     stereo = [[_stereo_offset(s, side, cloud) for side in (0, 1)] for s in sheets]
     bias, scatter = stereo_bias(seen, stereo, noise)
+    seen = believed(seen, stereo, bias, scatter)
     offset, error = np.zeros((len(sheets), 2)), np.full((len(sheets), 2), np.inf)
     for k in range(len(sheets)):
         for side in (0, 1):
@@ -78,6 +80,19 @@ def stereo_bias(seen, stereo, noise: float) -> tuple[float, float]:
     bias, _ = robust_mean(values, np.hypot(errors, noise))
     scatter = 1.4826 * float(np.median(np.abs(values - bias)))
     return bias, float(max(scatter, noise))
+
+
+def believed(seen, stereo, bias: float, scatter: float):
+    """What photographs say of faces, None where stereo points, less the others' bias, lie elsewhere: shadows and what
+    stands on a board can agree between views as well as grain does.
+    """
+    def agrees(told, points) -> bool:
+        return points is None or abs(told[0] - points[0] - bias) < ASTRAY * np.linalg.norm([scatter, told[1], points[1]])
+
+    return [
+        [t if t is not None and agrees(t, p) else None for t, p in zip(*sides, strict=True)]
+        for sides in zip(seen, stereo, strict=True)
+    ]
 
 
 def robust_mean(values: np.ndarray, errors: np.ndarray) -> tuple[float, float]:
