@@ -87,7 +87,9 @@ def believed(seen, stereo, bias: float, scatter: float):
     stands on a board can agree between views as well as grain does.
     """
     def agrees(told, points) -> bool:
-        return points is None or abs(told[0] - points[0] - bias) < ASTRAY * np.linalg.norm([scatter, told[1], points[1]])
+        if points is None:
+            return True
+        return abs(told[0] - points[0] - bias) < ASTRAY * np.linalg.norm([scatter, told[1], points[1]])
 
     return [
         [t if t is not None and agrees(t, p) else None for t, p in zip(*sides, strict=True)]
