@@ -11,6 +11,8 @@ from kerfwright_exporters.cadquery_program import export
 from simple import bevel, board, hole, rectangle, stool
 from truths import AVAILABLE, truth_model
 
+SLOW = ("complex_stool", "nightstand")  # to solve: benchmarks/exports.py does
+
 
 def assembly(source: str):
     space = {"__name__": "program"}
@@ -27,7 +29,7 @@ def assert_same(found, model: Model, places: float = 1e-5) -> None:
 
 
 @pytest.mark.skipif(not AVAILABLE, reason="the captures with truth are not on this machine")
-@pytest.mark.parametrize("name", AVAILABLE)
+@pytest.mark.parametrize("name", [n for n in AVAILABLE if n not in SLOW])
 def test_truths_are_solved_to_the_same_places(name, tmp_path):
     (path,) = export(truth_model(name), tmp_path, ExportOptions())
     assert_same(assembly(path.read_text()), truth_model(name))
