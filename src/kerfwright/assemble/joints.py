@@ -16,8 +16,6 @@ from kerfwright.identify.types import Sheet
 
 LEAST_SURE = 0.3  # of an interface: columns that end where most do
 
-LEAST_SURE = 0.3  # of an interface: columns that end where most do
-
 __all__ = ["Joint", "Search", "Trace", "columns", "end_on", "face_plane", "runs_of", "trace_of"]
 
 
@@ -147,18 +145,23 @@ def columns(region: Polygon, trace: Trace, step: float) -> tuple[np.ndarray, np.
     ring = np.asarray(region.exterior.coords)
     inside, position = trace.coordinates(ring)
     along = np.arange(position.min() + step / 2, position.max(), step)
-    low, high = inside.min() - 1, inside.max() + 1
-    lines = shapely.linestrings(
-        np.stack([trace.place(np.full(len(along), low), along), trace.place(np.full(len(along), high), along)], axis=1)
-    )
-    first, last = np.full(len(along), np.nan), np.full(len(along), np.nan)
-    for k, cut in enumerate(shapely.intersection(lines, region)):
-        xy = shapely.get_coordinates(cut)
-        if len(xy) > 1:
-            s, _ = trace.coordinates(xy)
-            first[k], last[k] = s.min(), s.max()
-    seen = np.isfinite(first)
+    first, last = np.full(len(along), np.inf), np.full(len(along), -np.inf)
+    column, at = _crossings(along, inside, position)
+    np.minimum.at(first, column, at)
+    np.maximum.at(last, column, at)
+    seen = first < last
     return along[seen], first[seen], last[seen]
+
+
+def _crossings(along: np.ndarray, inside: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the edges of a closed ring cross columns: the column's index, and the distance inside the plane."""
+    low, high = np.minimum(position[:-1], position[1:]), np.maximum(position[:-1], position[1:])
+    start = np.searchsorted(along, low)
+    count = np.searchsorted(along, high) - start  # an edge has its lower end, not its upper one
+    edge = np.repeat(np.arange(len(count)), count)
+    column = start[edge] + np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
+    share = (along[column] - position[edge]) / (position[edge + 1] - position[edge])
+    return column, inside[edge] + share * (inside[edge + 1] - inside[edge])
 
 
 def _has_wood(one: Sheet, other: Sheet, trace: Trace, along: np.ndarray, reach: float) -> np.ndarray:
