@@ -157,11 +157,13 @@ def run_stages(
 
 def _capture(path: Path, options: ReconstructOptions) -> Capture:
     from kerfwright.capture import PrepareOptions, crop_options, open_capture, prepare
+    from kerfwright.capture.photos import lightened
 
     opened = open_capture(path, up=options.up, millimetres_per_unit=options.millimetres_per_unit)
     if options.markers:
         opened = _scaled_by_markers(opened, options.markers)
-    return _in_working_units(prepare(opened, PrepareOptions(**crop_options(options.crop), ground=options.ground)))
+    prepared = prepare(opened, PrepareOptions(**crop_options(options.crop), ground=options.ground))
+    return _in_working_units(lightened(prepared))
 
 
 def _scaled_by_markers(capture: Capture, text: str) -> Capture:

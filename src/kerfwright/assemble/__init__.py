@@ -31,6 +31,7 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     from kerfwright.assemble.flush import flush_neighbours
     from kerfwright.assemble.gaps import mended
     from kerfwright.assemble.laid import laid_contacts, laid_on
+    from kerfwright.assemble.rags import pieced_together
     from kerfwright.assemble.snap import moved_with, snapped_to_stock
     from kerfwright.assemble.stock import share_thickness
     from kerfwright.assemble.veils import still_open, unveiled
@@ -40,14 +41,15 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     options = options or AssembleOptions()
     diameter = capture.cloud.diameter
     sheets, _ = align_sheets(parts.sheets, capture.cloud, options)
+    free = see_through(capture, parts.spacing, max(5 * parts.noise, diameter / 150))
     photos = Photos(capture)
     edges: tuple[tuple[ConstraintSegment, ...], ...] = tuple(() for _ in sheets)
     if options.rough:
+        sheets = pieced_together(sheets, capture.cloud, free, options)
         sheets, edges = unveiled(sheets, capture.cloud, photos, options)
     else:
         sheets = remeasured(sheets, capture.cloud, photos, parts.noise)
     sheets = measured_backs(sheets, photos, diameter, options)
-    free = see_through(capture, parts.spacing, max(5 * parts.noise, diameter / 150))
     sheets = mended(sheets, capture.cloud, free, options)
     sheets = flush_neighbours(share_thickness(sheets, diameter, options), diameter, options)
     sheets = laid_on(sheets, capture.cloud, free, options)

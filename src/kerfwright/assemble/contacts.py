@@ -166,22 +166,28 @@ def _gap_is_free(scene: _Scene, joint: Joint) -> bool:
 
 
 def _gap_is_taken(scene: _Scene, joint: Joint) -> bool:
-    """Whether another board lies between b's outline and the plane."""
-    places = _gap_places(scene, joint)
+    """Whether another board lies between b's outline and the plane: it fills much of the gap, or goes right across it,
+    however thin it is.
+    """
+    others = [sheet for k, sheet in enumerate(scene.sheets) if k not in (joint.a, joint.b)]
+    thinnest = min((sheet.thickness.value for sheet in others), default=np.inf)
+    steps = int(np.clip(2 * joint.gap / thinnest, 4, 200))
+    places = _gap_places(scene, joint, (np.arange(steps) + 0.5) / steps)
     taken = np.zeros(len(places), bool)
-    for k, sheet in enumerate(scene.sheets):
-        if k not in (joint.a, joint.b):
-            x = sheet.to_board(places)
-            inside = (x[:, 2] > 0) & (x[:, 2] < sheet.thickness.value)
-            taken[inside] |= shapely.contains_xy(sheet.region, x[inside, 0], x[inside, 1])
-    return float(taken.mean()) > MOST_SPOILT
+    for sheet in others:
+        x = sheet.to_board(places)
+        inside = (x[:, 2] > 0) & (x[:, 2] < sheet.thickness.value)
+        taken[inside] |= shapely.contains_xy(sheet.region, x[inside, 0], x[inside, 1])
+    taken = taken.reshape(steps, -1)  # from the plane to the outline
+    crossed = (taken[1:] & np.logical_or.accumulate(~taken[:-1])).any(axis=0)
+    return max(float(taken.mean()), float(crossed.mean())) > MOST_SPOILT
 
 
-def _gap_places(scene: _Scene, joint: Joint) -> np.ndarray:
-    """Places (N, 3) in the part of b that nobody saw, world."""
+def _gap_places(scene: _Scene, joint: Joint, shares: Sequence[float] = (0.2, 0.4, 0.6, 0.8)) -> np.ndarray:
+    """Places (N, 3) in the part of b that nobody saw, world, at some shares of the way from the plane."""
     b = scene.sheets[joint.b]
     inside, along = joint.trace.coordinates(joint.ends)
-    layers = [joint.trace.place(share * inside, along) for share in (0.2, 0.4, 0.6, 0.8)]
+    layers = [joint.trace.place(share * inside, along) for share in shares]
     heights = b.thickness.value * np.array([0.3, 0.7])
     return b.to_world(np.concatenate([np.c_[xy, np.full(len(xy), z)] for xy in layers for z in heights]))
 
@@ -222,7 +228,8 @@ def _confirmed(scene: _Scene, joint: Joint | None) -> Decided | None:
 
 def _end(scene: _Scene, joint: Joint) -> End | None:
     window, fringe = scene.mm(scene.options.end_offset), scene.mm(scene.options.veil)
-    return look_for_end(scene.sheets, joint, scene.photos, scene.obstacles, window, fringe)
+    beside = scene.mm(scene.options.reach)
+    return look_for_end(scene.sheets, joint, scene.photos, scene.obstacles, window, fringe, beside)
 
 
 def _ends_before(scene: _Scene, joint: Joint, end: End) -> bool:

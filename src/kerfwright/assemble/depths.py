@@ -21,6 +21,7 @@ from kerfwright.capture.types import Cloud
 from kerfwright.identify.photo_edges import Photos, refine_peak, sweep_edge
 from kerfwright.identify.thickness import looking_at
 from kerfwright.identify.types import Sheet
+from kerfwright.parallel import each
 
 __all__ = ["remeasured"]
 
@@ -55,7 +56,7 @@ def remeasured(
     if len(photos.views) < 2:
         return sheets
     faces = measured_faces(sheets, cloud, photos, noise)
-    edges = [_edges(sheet, photos, cloud.diameter) for sheet in sheets]
+    edges = each(lambda sheet: _edges(sheet, photos, cloud.diameter), sheets)
     easing = _easing(faces, edges)
     return tuple(
         _settled(sheet, faces.offset[k], faces.error[k], edges[k], easing, cloud.diameter)

@@ -18,6 +18,7 @@ import shapely
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.photo_edges import Photos, refine_peak
 from kerfwright.identify.types import Sheet
+from kerfwright.parallel import each
 
 __all__ = ["Faces", "believed", "measured_faces", "robust_mean", "stereo_bias"]
 
@@ -53,7 +54,7 @@ def measured_faces(sheets: Sequence[Sheet], cloud: Cloud, photos: Photos, noise:
     noise : standard deviation of the cloud across its surface: what a face's points alone are good for.
     """
     size = cloud.diameter
-    seen = [[_grain_offset(s, side, photos, size) for side in (0, 1)] for s in sheets]
+    seen = each(lambda s: [_grain_offset(s, side, photos, size) for side in (0, 1)], sheets)
     stereo = [[_stereo_offset(s, side, cloud) for side in (0, 1)] for s in sheets]
     bias, scatter = stereo_bias(seen, stereo, noise)
     seen = believed(seen, stereo, bias, scatter)

@@ -6,6 +6,7 @@ show what lies behind them, or their own cut faces.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +20,7 @@ from kerfwright.capture.types import Cloud
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.types import Sheet
 
-__all__ = ["mended"]
+__all__ = ["is_seen", "is_thin", "mended", "usual_density"]
 
 LINED = 0.15  # of a gap's outline; beyond, cut faces show that it is real
 SEEN = 0.3  # of a gap's area; beyond, it was seen through
@@ -31,8 +32,13 @@ SAMPLES = 60
 def mended(sheets: tuple[Sheet, ...], cloud: Cloud, free: FreeSpace, options: AssembleOptions) -> tuple[Sheet, ...]:
     """The sheets with the gaps in their regions filled that are only gaps of the cloud."""
     reach, near = options.veil * cloud.diameter, options.end_offset * 2 * cloud.diameter
-    usual = float(np.quantile([_face(s, cloud).shape[0] / s.region.area for s in sheets], USUAL))
-    return tuple(_mended(sheet, cloud, free, reach, near, DENSE * usual) for sheet in sheets)
+    dense = usual_density(sheets, cloud)
+    return tuple(_mended(sheet, cloud, free, reach, near, dense) for sheet in sheets)
+
+
+def usual_density(sheets: Sequence[Sheet], cloud: Cloud) -> float:
+    """Points a mm2 that a sheet face has at least where it was seen well."""
+    return DENSE * float(np.quantile([_face(s, cloud).shape[0] / s.region.area for s in sheets], USUAL))
 
 
 def _face(sheet: Sheet, cloud: Cloud) -> np.ndarray:
@@ -53,7 +59,7 @@ def _mended(sheet: Sheet, cloud: Cloud, free: FreeSpace, reach: float, near: flo
     fill = [
         gap for gap in getattr(gaps, "geoms", [gaps])
         if gap.area > 1.0 and not _is_lined(gap, sheet.region, outline, tree, near)
-        and not _is_seen(gap, sheet, free) and _is_thin(gap, sheet.region, face, near, dense)
+        and not is_seen(gap, sheet, free) and is_thin(gap, sheet.region, face, near, dense)
     ]
     if not fill:
         return sheet
@@ -79,13 +85,13 @@ def _is_lined(
     return float((distance < near).mean()) > LINED
 
 
-def _is_thin(gap: Polygon, region: Polygon, face: np.ndarray, near: float, dense: float) -> bool:
+def is_thin(gap: Polygon, region: Polygon, face: np.ndarray, near: float, dense: float) -> bool:
     """Whether the wood round the gap was seen badly."""
     ring = gap.buffer(2 * near).intersection(region)
     return bool(shapely.contains_xy(ring, face[:, 0], face[:, 1]).sum() < dense * ring.area)
 
 
-def _is_seen(gap: Polygon, sheet: Sheet, free: FreeSpace) -> bool:
+def is_seen(gap: Polygon, sheet: Sheet, free: FreeSpace) -> bool:
     """Whether cameras saw through the gap."""
     low_x, low_y, high_x, high_y = gap.bounds
     step = max(np.sqrt(gap.area / SAMPLES), 0.5)

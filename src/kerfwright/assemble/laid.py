@@ -19,11 +19,12 @@ from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.types import Sheet
 from kerfwright.model import Contact, ContactEvidence, Origin
 
-__all__ = ["laid_contacts", "laid_on"]
+__all__ = ["laid_contacts", "laid_on", "moved_region"]
 
 PARALLEL = 1 - 1e-9  # cosine: one class of the alignment
 TOUCHING = 1e-6  # mm; faces that were put together
 SEEN = 0.25  # share of the overlap that must show points of a face for it to count as seen
+DEEPEST = 0.5  # overlap, of the thinner board's thickness: deeper ones are two finds of one board
 FREE = 0.2  # share of a gap that cameras saw through
 
 
@@ -124,13 +125,16 @@ def _pair(sheets: tuple[Sheet, ...], a: int, b: int, face_a: str, face_b: str, s
     one, other = sheets[a], sheets[b]
     offset = face_plane(one, face_a)[1]
     gap = float(-face_plane(other, face_b)[1]) - offset
-    if abs(gap) > min(one.thickness.value, other.thickness.value):
+    thinner = min(one.thickness.value, other.thickness.value)
+    if not -DEEPEST * thinner < gap < thinner:
         return None
-    overlap = one.region.intersection(_moved_region(other, one))
+    overlap = one.region.intersection(moved_region(other, one))
     return _Pair(a, b, face_a, face_b, gap, overlap) if overlap.area > shortest**2 else None
 
 
-def _moved_region(sheet: Sheet, to: Sheet) -> Polygon:
+def moved_region(sheet: Sheet, to: Sheet) -> Polygon:
+    """A board's region in the frame of a parallel one."""
+
     def ring(coords) -> np.ndarray:
         xy = np.asarray(coords)[:, :2]
         return to.to_board(sheet.to_world(np.c_[xy, np.zeros(len(xy))]))[:, :2]

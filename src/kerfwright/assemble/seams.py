@@ -61,13 +61,15 @@ def look_for_seam(
 
 
 def look_for_end(
-    sheets: tuple[Sheet, ...], joint: Joint, photos: Photos, obstacles: Obstacles, window: float, fringe: float
+    sheets: tuple[Sheet, ...], joint: Joint, photos: Photos, obstacles: Obstacles, window: float, fringe: float,
+    beside: float,
 ) -> End | None:
     """Whether b, whose outline stops short of a, is seen to run on up to it: an edge that most stretches and views show
     at the plane, and no clearer one before it.
 
-    window: mm that the edge may be off; fringe: mm by which the outline may be too large. None when no photograph
-    shows the place.
+    window: mm that the edge may be off; fringe: mm by which the outline may be too large; beside: mm before the plane in
+    which an edge speaks for the plane as well, for boards so near are connected. None when no photograph shows the
+    place.
     """
     found = []
     for face in ("top", "bottom"):
@@ -75,17 +77,16 @@ def look_for_end(
             sheets[joint.b], joint, face, photos, obstacles, -4 * window, joint.gap + fringe, 0.5 * window
         )
         if sweep is not None:
-            found.append(_end(sweep, window))
+            found.append(_end(sweep, window, beside))
     return max(found, key=lambda e: (min(e.views, 3), e.excess)) if found else None
 
 
-def _end(sweep: SweepResult, window: float) -> End:
+def _end(sweep: SweepResult, window: float, beside: float) -> End:
     strength = sweep.strength / np.median(sweep.strength)
     excess = sweep.persistence - np.median(sweep.persistence)
     near = np.abs(sweep.offsets) <= window
     k = int(np.argmax(np.where(near, strength * np.maximum(excess, 0.0), -np.inf)))
-    before = sweep.offsets > 2 * window
-    rival = int(np.argmax(np.where(before, strength, -np.inf)))
+    rival = int(np.argmax(np.where(sweep.offsets > beside, strength, -np.inf)))
     return End(
         float(strength[k]), sweep.views, float(excess[k]), float(sweep.offsets[rival]), float(strength[rival]),
         float(excess[rival]),

@@ -28,6 +28,8 @@ LEAST_STRENGTH = 7.0  # of a board's best seam, against the usual change across 
 LENT_STRENGTH = 4.0  # of further ones: where two boards were glued, more may have been
 LEAST_ALONG = 0.5  # share of the change that every third of the line must show
 LEAST_VIEWS = 4
+DENIED = 2.0  # strength at a seam's place on the other face, below which there is none
+THROUGH = 1 / 150  # of D, between a seam's places on both faces
 LEAST_AGREEMENT = 0.75  # mean share of the change that a single view shows
 CENTRED = 4  # samples to either side of a peak that say where its middle lies
 EASED = 1 / 40  # of D; eased edges of two boards lie no further apart
@@ -55,27 +57,42 @@ def find_seam_lines(
     """Seams across a board in the direction that shows the strongest one, in order along it."""
     ring = np.asarray(sheet.region.minimum_rotated_rectangle.exterior.coords)
     first = (ring[1] - ring[0]) / np.linalg.norm(ring[1] - ring[0])
-    found = [
-        _seams_across(sheet, m, face, touching, photos, obstacles, diameter)
-        for m in (first, np.array([-first[1], first[0]])) for face in ("top", "bottom")
-    ]
+    found = []
+    for m in (first, np.array([-first[1], first[0]])):
+        top, bottom = (_change(sheet, m, face, photos, obstacles, diameter) for face in ("top", "bottom"))
+        for own, other in ((top, bottom), (bottom, top)):
+            seams = _seams_across(sheet, m, own, touching, diameter) if own is not None else []
+            found.append([s for s in seams if not _is_denied(s, own, other, diameter)])
     best = max(found, key=lambda seams: max((s.strength for s in seams), default=0.0))
     return sorted(best, key=lambda s: s.offset)
 
 
-def _seams_across(
-    sheet: Sheet, m: np.ndarray, face: str, touching: list[Sheet], photos: Photos, obstacles: Obstacles, diameter: float
-) -> list[SeamLine]:
+def _change(
+    sheet: Sheet, m: np.ndarray, face: str, photos: Photos, obstacles: Obstacles, diameter: float
+) -> Discontinuity | None:
+    """What changes across a face along m; None where too little of it is seen."""
     ring = np.asarray(sheet.region.exterior.coords)[:, :2]
     margin = NARROWEST * diameter
     if np.ptp(ring @ m) < 2.5 * margin or np.ptp(ring @ [-m[1], m[0]]) < margin:
-        return []
+        return None
     strips = face_strips(sheet, m, face, photos, obstacles, diameter)
-    if strips is None or len(strips.colours) < LEAST_VIEWS:
-        return []
-    change = discontinuity(strips)
-    if change is None:
-        return []
+    return discontinuity(strips) if strips is not None and len(strips.colours) >= LEAST_VIEWS else None
+
+
+def _is_denied(seam: SeamLine, own: Discontinuity, other: Discontinuity | None, diameter: float) -> bool:
+    """Whether the other face, shown by as many views, changes no more than usual there: a seam goes right through."""
+    if other is None or len(other.single) < len(own.single):
+        return False
+    near = np.abs(other.offsets - seam.offset) < THROUGH * diameter
+    told = other.strength[near & np.isfinite(other.strength)]
+    return bool(len(told) and told.max() < DENIED)
+
+
+def _seams_across(
+    sheet: Sheet, m: np.ndarray, change: Discontinuity, touching: list[Sheet], diameter: float
+) -> list[SeamLine]:
+    ring = np.asarray(sheet.region.exterior.coords)[:, :2]
+    margin = NARROWEST * diameter
     known = _known_lines(sheet, m, touching)
     seams = [_seam(change, k, m, ring, diameter) for k in _seam_places(change, ring @ m, margin)]
     seams = [

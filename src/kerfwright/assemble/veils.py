@@ -22,6 +22,7 @@ from kerfwright.assemble.visibility import Obstacles
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.types import Sheet
+from kerfwright.parallel import each
 
 __all__ = ["still_open", "unveiled"]
 
@@ -51,7 +52,7 @@ def unveiled(
     """
     obstacles = Obstacles(sheets, options.outline_error * cloud.diameter)
     scene = _Scene(cloud, photos, obstacles, options)
-    found = [_without_veils(sheet, [s for s in sheets if s is not sheet], scene) for sheet in sheets]
+    found = each(lambda sheet: _without_veils(sheet, [s for s in sheets if s is not sheet], scene), sheets)
     return tuple(sheet for sheet, _ in found), tuple(edges for _, edges in found)
 
 

@@ -53,6 +53,12 @@ class Camera:
         fx, fy = p.get("fx", p.get("f")), p.get("fy", p.get("f"))
         return np.array([[fx, 0, p["cx"]], [0, fy, p["cy"]], [0, 0, 1.0]])
 
+    def shrunk(self, factor: int) -> Camera:
+        """The camera of a picture in which factor x factor pixels became one; what is left over at the rim is cut off.
+        """
+        scaled = {name: value if name in LENS_TERMS else value / factor for name, value in self._named().items()}
+        return Camera(self.model, self.width // factor, self.height // factor, tuple(scaled.values()))
+
     @property
     def distortion(self) -> np.ndarray:
         """What bends the picture: all zero if and only if `distort` changes nothing.

@@ -23,12 +23,16 @@ __all__ = ["Capture", "Cloud", "View"]
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A photograph with its camera and pose: x_in_camera = camera_from_world @ x_in_world (4x4, rigid)."""
+    """A photograph with its camera and pose: x_in_camera = camera_from_world @ x_in_world (4x4, rigid).
+
+    One pixel of `camera` and `image` is the mean of `shrink` x `shrink` pixels of the file.
+    """
 
     name: str
     path: Path
     camera: Camera
     camera_from_world: np.ndarray
+    shrink: int = 1
 
     @property
     def centre(self) -> np.ndarray:
@@ -45,7 +49,7 @@ class View:
         return self.camera.project(x_in_camera), x_in_camera[:, 2]
 
     def image(self) -> np.ndarray:
-        """The photograph, (height, width, 3) uint8 RGB, as on disk (distorted). Read anew at each call.
+        """The photograph, (height, width, 3) uint8 RGB, shrunk, but distorted as on disk. Read anew at each call.
 
         Raises CaptureError when the file is missing, unreadable, or of another size than its camera.
         """
@@ -54,11 +58,15 @@ class View:
         pixels = cv2.imread(str(self.path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
         if pixels is None:
             raise CaptureError(f"{self.path}: image: cannot be read: check that the file is a whole JPEG, PNG or TIFF")
-        if pixels.shape[:2] != (self.camera.height, self.camera.width):
+        width, height = self.camera.width, self.camera.height
+        if (pixels.shape[1] // self.shrink, pixels.shape[0] // self.shrink) != (width, height):
             raise CaptureError(
                 f"{self.path}: image size: {pixels.shape[1]}x{pixels.shape[0]}, but its camera says "
-                f"{self.camera.width}x{self.camera.height}: use the images the cameras were computed for"
+                f"{width * self.shrink}x{height * self.shrink}: use the images the cameras were computed for"
             )
+        if self.shrink > 1:
+            whole = pixels[: height * self.shrink, : width * self.shrink]
+            pixels = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
         return cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB)
 
 

@@ -22,12 +22,15 @@ __all__ = [
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """What selection chooses from: planes of a cloud, slabs that may be boards, and what each explains."""
+    """What selection chooses from: planes of a cloud, slabs that may be boards, and what each explains; `dark` are seen
+    in rags, and are boards where nothing else is.
+    """
 
     cloud: Cloud
     around: Neighbourhood
     planes: list[Primitive]
     slabs: list[Slab]
+    dark: list[Slab]
     evidence: Evidence
 
 
@@ -42,6 +45,7 @@ def identify(capture: Capture, options: IdentifyOptions | None = None) -> Parts:
 
 def find_candidates(capture: Capture, options: IdentifyOptions) -> Candidates:
     """The first half of `identify`; raises as it does."""
+    from kerfwright.identify.dark import dark_slabs
     from kerfwright.identify.freespace import see_through
     from kerfwright.identify.photo_edges import Photos
     from kerfwright.identify.primitives import find_planes, look_around
@@ -57,18 +61,22 @@ def find_candidates(capture: Capture, options: IdentifyOptions) -> Candidates:
         raise StageError(
             "cloud: no plane has a thickness that a board could have: photograph the edges of the boards too"
         )
-    return Candidates(cloud, around, planes, slabs, gather_evidence(cloud, around, slabs, options))
+    dark = dark_slabs(capture, around, planes, free, options)
+    return Candidates(cloud, around, planes, slabs, dark, gather_evidence(cloud, around, slabs, options))
 
 
 def choose(found: Candidates, options: IdentifyOptions) -> Parts:
     """The second half of `identify`: the boards among the candidates; raises StageError when there are none."""
+    from kerfwright.identify.dark import with_dark_boards
     from kerfwright.identify.sheets import join_across, to_sheet
 
     cloud, around, slabs = found.cloud, found.around, found.slabs
     selection = _selected(cloud, slabs, found.evidence, options)
     if not selection.chosen:
         raise StageError("cloud: no set of boards explains it: check that the cloud shows one wooden object, cropped")
-    chosen = join_across([slabs[k] for k in selection.chosen], max(4 * around.spacing, cloud.diameter / 60))
+    reach = max(4 * around.spacing, cloud.diameter / 60)
+    boards = with_dark_boards([slabs[k] for k in selection.chosen], found.dark, found.planes, cloud, reach)
+    chosen = join_across(boards, reach)
     chosen.sort(key=lambda s: (-round(s.region.area), *s.world_from_board[:3, 3].round(3)))
     sheets = tuple(to_sheet(f"board_{k + 1:02d}", slab, cloud, around, options) for k, slab in enumerate(chosen))
     figures = {

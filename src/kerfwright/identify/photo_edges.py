@@ -9,25 +9,21 @@ background do not agree in this way.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d, minimum_filter1d
 
+from kerfwright.capture.photos import photograph
 from kerfwright.capture.types import Capture, View
 
 __all__ = ["Photos", "SweepResult", "refine_peak", "sweep_edge"]
 
 
 class Photos:
-    """Photographs of a capture, decoded once each and kept as bytes; sampled bilinearly."""
+    """Photographs of a capture, sampled bilinearly."""
 
     def __init__(self, capture: Capture):
         self.views = capture.views
-        self._pixels = lru_cache(maxsize=None)(self._read)
-
-    def _read(self, k: int) -> np.ndarray:
-        return self.views[k].image()
 
     def colours(self, k: int, pixels: np.ndarray) -> np.ndarray:
         """(..., 2) pixel positions to (..., 3) float32 RGB; NaN outside the photograph."""
@@ -40,7 +36,7 @@ class Photos:
         padded = np.zeros((-len(flat) % rows + len(flat), 2), np.float32)
         padded[: len(flat)] = np.where(inside[:, None], flat, 0)
         maps = padded.reshape(-1, rows, 2)
-        out = cv2.remap(self._pixels(k), maps, None, cv2.INTER_LINEAR).reshape(-1, 3)[: len(flat)].astype(np.float32)
+        out = cv2.remap(photograph(view), maps, None, cv2.INTER_LINEAR).reshape(-1, 3)[: len(flat)].astype(np.float32)
         out[~inside] = np.nan
         return out.reshape(*pixels.shape[:-1], 3)
 
@@ -72,8 +68,10 @@ def sweep_edge(
 
     places (N, 3) world mm, neighbours in order along the edge; direction (3,) or (N, 3) unit; offsets (T,) mm, evenly
     spaced; visible (V, N) bool: which view shows which place, or (V, N, T): at which offset. smoothing: mm of the step
-    detector. chunk: places averaged before the step is measured. None when no view shows a whole chunk.
+    detector. chunk: places averaged before the step is measured. None when no view shows a whole chunk, or offsets are too few for a step.
     """
+    if len(offsets) < 2:
+        return None
     direction = np.broadcast_to(direction, places.shape)
     grid = places[:, None, :] + offsets[None, :, None] * direction[:, None, :]
     step = offsets[1] - offsets[0]

@@ -6,14 +6,16 @@ the region that points on its two sheet planes cover.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import shapely
-from shapely.geometry import Polygon
+from shapely.geometry import MultiPoint, Polygon
 
 from kerfwright.capture.types import Capture
-from kerfwright.identify.bars import find_bars
+from kerfwright.identify.bars import Bar, find_bars
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.options import IdentifyOptions
 from kerfwright.identify.photo_edges import Photos
@@ -30,10 +32,16 @@ from kerfwright.identify.thickness import (
 )
 from kerfwright.identify.told import Known, told_by_others
 from kerfwright.identify.types import Primitive
+from kerfwright.parallel import each
 
-__all__ = ["Slab", "candidate_slabs", "footprint", "plane_frame"]
+__all__ = ["Slab", "candidate_slabs", "footprint", "free_share", "plane_frame"]
 
 
+CUT_FACE = 0.3  # cosine between a board's normal and that of its cut faces, at most
+ALONG_AXIS = 0.9  # cosine between a bar and the normal of a board across it, at least
+MOST_BESIDE = 0.6  # of a bar's section put beside it, that a board which parts it fills
+CLEAR = 3.3  # strength of an edge that tells a thickness by itself
+CLEARER = 1.5  # times another edge's
 UNSEEN = ("cut", "twin", "inferred")  # evidence that no photograph and no opposite plane gave
 
 _Seed = tuple[tuple[int, ...], np.ndarray, Polygon]  # coplanar patches, world_from_top frame, region
@@ -92,7 +100,7 @@ def candidate_slabs(
     """All candidates that are neither too thick for their region nor seen through, in the order of their planes."""
     scene = _Scene(capture, around, planes, free, options, photos)
     seeds = [seed for number in range(len(planes)) for seed in _seeds(scene, number)]
-    known = told_by_others([_looked_at(scene, seed) for seed in seeds], scene)
+    known = told_by_others(each(partial(_looked_at, scene), seeds), scene)
     stock = _common(known)
     own = [k for k in known if k.hypotheses and not k.told]
     found = [slab for k in own for h in k.hypotheses for slab in _slabs(scene, k.top, k.frame, k.piece, h)]
@@ -112,12 +120,40 @@ def _bars(scene: _Scene, known: list[Slab]) -> list[Slab]:
         return found
     for bar in find_bars(scene.capture, scene.planes, scene.photos, scene.fringe, scene.options):
         ends = [scene.capture.cloud.points[scene.planes[k].point_idx] for k in bar.ends]
-        if any(all(_holds(scene, slab, end) for end in ends) for slab in known):
+        if any(all(_holds(scene, slab, end) for end in ends) for slab in known) or _is_parted(scene, bar, ends, known):
             continue
         free = _free_share(scene, bar.world_from_board, bar.thickness.value, bar.region)
         if free <= scene.options.max_free:
             found.append(Slab(bar.world_from_board, bar.thickness, bar.region, (), (), free))
     return found
+
+
+def _is_parted(scene: _Scene, bar: Bar, ends: Sequence[np.ndarray], known: list[Slab]) -> bool:
+    """Whether the ends belong to two boards that were seen from both sides, and a third one between them goes on beyond
+    the bar on both sides: they end on it.
+    """
+    axis = bar.world_from_board[:3, 1]
+    seen = [slab for slab in known if slab.thickness.evidence == "opposite"]
+    stubs = [slab for slab in seen if abs(slab.normal @ axis) < CUT_FACE]
+    if not all(any(_holds(scene, slab, end) for slab in stubs) for end in ends):
+        return False
+    return any(_goes_on_beside(slab, bar) for slab in seen if abs(slab.normal @ axis) > ALONG_AXIS)
+
+
+def _goes_on_beside(slab: Slab, bar: Bar) -> bool:
+    """Whether a slab across a bar lies between its ends, and has wood on both sides of its sheet planes; the bar's own
+    section is hidden.
+    """
+    thickness, (low_x, low_y, high_x, high_y) = bar.thickness.value, bar.region.bounds
+    for z in ((-thickness, 0.0), (thickness, 2 * thickness)):
+        corners = np.array([[x, y, height] for x in (low_x, high_x) for y in (low_y, high_y) for height in z])
+        x = slab.to_board(corners @ bar.world_from_board[:3, :3].T + bar.world_from_board[:3, 3])
+        beside = MultiPoint(x[:, :2]).convex_hull
+        if not x[:, 2].min() < 0 < slab.thickness.value < x[:, 2].max():
+            return False
+        if beside.intersection(slab.region).area < MOST_BESIDE * beside.area:
+            return False
+    return True
 
 
 def _holds(scene: _Scene, slab: Slab, points: np.ndarray) -> bool:
@@ -259,15 +295,22 @@ def _looked_at(scene: _Scene, seed: _Seed) -> Known:
     rim = trace_rim(frame, piece, cloud, around, scene.diameter / 40, spacing=scene.rim_spacing, width=scene.fringe)
     photos = from_photos(frame, rim, scene.photos, (low, high), step=scene.diameter * scene.options.sweep_step)
     found = [sharpened(h, photos) for h in opposite] or [
-        p for p in photos[:2] if p.support > max(3.3, 0.7 * photos[0].support)
+        p for p in photos[:2] if p.support > max(CLEAR, 0.7 * photos[0].support)
     ]
     if not found and not scene.photos.views:
         found = from_cut_faces(frame, piece, cloud, around, (low, high))
     height = frame[2, 3]
     level = frame[2, 2] > 0.999 and low < height < high and not any(h.near(height) for h in found)
-    if level and reaches_ground(frame, piece, cloud, around, height):
+    if level and not _ends_above(photos, height) and reaches_ground(frame, piece, cloud, around, height):
         found.append(ThicknessHypothesis(float(height), 2 * around.noise, "ground", piece.area))
     return Known(top, frame, piece, rim, tuple(found))
+
+
+def _ends_above(photos: list[ThicknessHypothesis], height: float) -> bool:
+    """Whether the photographs show a level board's end above the floor, clearly, and clearer than what they show there.
+    """
+    floor = max((h.support for h in photos if abs(h.value - height) < 0.1 * height), default=0.0)
+    return any(h.support > CLEAR and h.support > CLEARER * floor for h in photos if h.value < 0.6 * height)
 
 
 def _slabs(
@@ -306,12 +349,21 @@ def _sites(region: Polygon, board: np.ndarray, heights: np.ndarray, count: int) 
 
 
 def _free_share(scene: _Scene, board: np.ndarray, thickness: float, piece: Polygon) -> float:
-    inner = piece.buffer(-min(2 * scene.cell, thickness / 3))
+    return free_share(board, thickness, piece, scene.free, 2 * scene.cell, scene.options.free_sites)
+
+
+def free_share(
+    board: np.ndarray, thickness: float, piece: Polygon, free: FreeSpace, margin: float, count: int
+) -> float:
+    """Share of a slab's interior, at least `margin` mm inside its region or a third of its thickness, that cameras saw
+    through, by `count` places.
+    """
+    inner = piece.buffer(-min(margin, thickness / 3))
     if inner.is_empty:
         return 0.0
     heights = thickness * np.linspace(0.15, 0.85, 5)
-    sites = _sites(inner, board, heights, scene.options.free_sites)
-    return float((scene.free.votes(sites) >= 2).mean()) if len(sites) else 0.0
+    sites = _sites(inner, board, heights, count)
+    return float((free.votes(sites) >= 2).mean()) if len(sites) else 0.0
 
 
 def _distinct(slabs: list[Slab]) -> list[Slab]:

@@ -20,6 +20,7 @@ from kerfwright.capture.types import Capture
 from kerfwright.identify.freespace import see_through
 from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.types import Parts, Sheet
+from kerfwright.parallel import each
 from kerfwright.refine.constrain import outline_region
 from kerfwright.refine.options import RefineOptions
 from kerfwright.refine.segment import SegmentOptions, segment_boards
@@ -100,20 +101,19 @@ def _split(pieces: list[Piece], assembly: Assembly, capture: Capture) -> list[Pi
     """Pieces with the boards that show seams taken apart."""
     diameter, photos = capture.cloud.diameter, Photos(capture)
     obstacles = Obstacles([p.sheet for p in pieces], diameter / 100)
-    out: list[Piece] = []
-    for piece in pieces:
+
+    def taken_apart(piece: Piece) -> list[Piece]:
         ring = _ring_boards(piece, photos, obstacles, capture)
         if ring:
-            out += ring
-            continue
+            return ring
         touching = _touching(piece.sheet.name, assembly)
         seams = find_seam_lines(piece.sheet, touching, photos, obstacles, diameter)
         if not seams:
-            out.append(piece)
-            continue
+            return [piece]
         sheets = split_sheet(piece.sheet, seams, capture.cloud.points)
-        out += [Piece(s, piece.outline, seam) for s, seam in zip(sheets, [None, *seams], strict=True)]
-    return out
+        return [Piece(s, piece.outline, seam) for s, seam in zip(sheets, [None, *seams], strict=True)]
+
+    return [part for parts in each(taken_apart, pieces) for part in parts]
 
 
 def _ring_boards(piece: Piece, photos: Photos, obstacles: Obstacles, capture: Capture) -> list[Piece]:

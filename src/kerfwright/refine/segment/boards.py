@@ -6,7 +6,6 @@ Each round every board is cut out of the photographs, the others being as the la
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -19,6 +18,7 @@ from kerfwright.capture.types import Capture
 from kerfwright.errors import OptionError
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.types import Sheet
+from kerfwright.parallel import each
 from kerfwright.refine.segment.boundary import Chain, chain_of, loops_of, open_chain, registration, settle, snap
 from kerfwright.refine.segment.constraints import Limit, carve, fill_to_contacts, limits_of, margins
 from kerfwright.refine.segment.edges import EdgeScan, agreed_strength, scan_edges
@@ -123,17 +123,17 @@ def segment_boards(
         raise OptionError(f"constraints: length: {len(constraints)} for {len(sheets)} sheets: give one list a sheet")
     photos = Photos()
     occluders = Occluders(sheets, [[s.region] for s in sheets])
-    with ThreadPoolExecutor(max(1, options.threads)) as pool:
-        boards = list(pool.map(
-            lambda i: _begin(i, sheets[i], constraints[i], capture, occluders, free, options), range(len(sheets))
-        ))
-        for round_idx in range(options.rounds):
-            last = boards
-            boards = list(pool.map(
-                lambda b: _round(b, last, occluders, photos, options, round_idx), boards  # noqa: B023
-            ))
-            occluders = Occluders(sheets, [b.regions for b in boards])
-        return list(pool.map(lambda b: _finish(b, capture, occluders, photos, options), boards))
+    boards = each(
+        lambda i: _begin(i, sheets[i], constraints[i], capture, occluders, free, options), range(len(sheets)),
+        options.threads,
+    )
+    for round_idx in range(options.rounds):
+        last = boards
+        boards = each(
+            lambda b: _round(b, last, occluders, photos, options, round_idx), boards, options.threads  # noqa: B023
+        )
+        occluders = Occluders(sheets, [b.regions for b in boards])
+    return each(lambda b: _finish(b, capture, occluders, photos, options), boards, options.threads)
 
 
 def _begin(

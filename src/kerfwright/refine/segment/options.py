@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from kerfwright.parallel import THREADS
 from kerfwright.refine.types import Outline
 
 __all__ = ["BoardOutlines", "SegmentOptions"]
@@ -41,7 +42,7 @@ class SegmentOptions:
     step: float = 1.0  # between boundary points
     correlated_error: float = 0.08  # what no averaging removes: blur, rounded arrises, the plane's own error
     seed: int = 0
-    threads: int = 2
+    threads: int = THREADS
 
 
 @dataclass(frozen=True, eq=False)

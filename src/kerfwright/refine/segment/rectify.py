@@ -7,6 +7,7 @@ from threading import Lock
 
 import numpy as np
 
+from kerfwright.capture.photos import photograph
 from kerfwright.capture.types import View
 from kerfwright.identify.types import Sheet
 from kerfwright.refine.segment.grid import Grid
@@ -20,7 +21,7 @@ GAIN = 2.0  # largest exposure step between two photographs that is evened out
 
 
 class Photos:
-    """The photographs, each decoded once and at most two resolutions kept; safe between threads."""
+    """The photographs at the resolutions that were asked for; safe between threads."""
 
     def __init__(self) -> None:
         self._lock = Lock()
@@ -28,18 +29,18 @@ class Photos:
 
     def get(self, view: View, shrink: int = 1) -> np.ndarray:
         """(height / shrink, width / shrink, 3) uint8 RGB."""
+        if shrink == 1:
+            return photograph(view)
         key = (str(view.path) or view.name, shrink)
         with self._lock:
             if key not in self._kept:
-                self._kept[key] = _shrunk(view.image(), shrink)
+                self._kept[key] = _shrunk(photograph(view), shrink)
             return self._kept[key]
 
 
 def _shrunk(image: np.ndarray, shrink: int) -> np.ndarray:
     import cv2
 
-    if shrink == 1:
-        return image
     size = (image.shape[1] // shrink, image.shape[0] // shrink)
     return cv2.resize(image[: size[1] * shrink, : size[0] * shrink], size, interpolation=cv2.INTER_AREA)
 

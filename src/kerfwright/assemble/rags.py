@@ -1,0 +1,138 @@
+"""Boards that the cloud shows in several pieces, put together again.
+
+Stereo sees a dark board in rags. Two pieces in one plane are one board when nothing but a gap of the cloud lies between
+them: nobody saw through it, no cut face lines it, and no other board runs through it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+import shapely
+from scipy.spatial import cKDTree
+from shapely.geometry import Polygon
+
+from kerfwright.assemble.gaps import is_seen, is_thin, usual_density
+from kerfwright.assemble.laid import moved_region
+from kerfwright.assemble.options import AssembleOptions
+from kerfwright.assemble.outlines import largest_piece
+from kerfwright.capture.types import Cloud
+from kerfwright.identify.freespace import FreeSpace
+from kerfwright.identify.types import Sheet
+
+__all__ = ["pieced_together"]
+
+PARALLEL = 1 - 1e-6  # cosine between pieces of one board, once aligned
+LEVEL = 1 / 250  # of D, between their faces
+WIDEST = 1 / 6  # of D, between pieces
+RAGGED = 1 / 25  # of D, by which facing outlines may wander
+BESIDE = 0.4  # of the smaller piece's width that must look at the other one
+LINED = 0.15  # of the outlines on both sides of a gap; beyond, cut faces show that it is real
+THROUGH = 0.25  # of a gap, that lies in another board
+
+
+@dataclass(frozen=True)
+class _Scene:
+    cloud: Cloud
+    free: FreeSpace
+    near: float  # mm about an outline where cut faces line it
+    dense: float  # points a mm2 of a face seen well
+
+
+def pieced_together(
+    sheets: Sequence[Sheet], cloud: Cloud, free: FreeSpace, options: AssembleOptions
+) -> tuple[Sheet, ...]:
+    """The sheets with pieces of one board joined; the larger one keeps its name and place."""
+    scene = _Scene(cloud, free, 2 * options.end_offset * cloud.diameter, usual_density(sheets, cloud))
+    found = list(sheets)
+    while True:
+        tried = ((a, b, _joined(a, b, found, scene)) for a, b in combinations(found, 2))
+        hit = next((entry for entry in tried if entry[2] is not None), None)
+        if hit is None:
+            return tuple(found)
+        a, b, whole = hit
+        found = [whole if s is a else s for s in found if s is not b]
+
+
+def _joined(a: Sheet, b: Sheet, sheets: Sequence[Sheet], scene: _Scene) -> Sheet | None:
+    """The two as one board, if they are one."""
+    if not _in_one_plane(a, b, LEVEL * scene.cloud.diameter):
+        return None
+    other = moved_region(b, a)
+    gap = _between(a.region, other, WIDEST * scene.cloud.diameter, RAGGED * scene.cloud.diameter)
+    if gap is None:
+        return None
+    rest = [s for s in sheets if s is not a and s is not b]
+    if not gap.is_empty and not _is_rag(a, b, other, gap, rest, scene):
+        return None
+    region = largest_piece(shapely.union_all([a.region, other, gap]).buffer(0.05))
+    better = min((a, b), key=lambda s: s.thickness.standard_error or np.inf)
+    top, bottom = (b.top_idx, b.bottom_idx) if a.normal @ b.normal > 0 else (b.bottom_idx, b.top_idx)
+    return replace(
+        a, region=region, thickness=better.thickness, thickness_seen=a.thickness_seen or b.thickness_seen,
+        top_idx=np.union1d(a.top_idx, top), bottom_idx=np.union1d(a.bottom_idx, bottom),
+        cut_idx=np.union1d(a.cut_idx, b.cut_idx),
+    )
+
+
+def _in_one_plane(a: Sheet, b: Sheet, level: float) -> bool:
+    """Whether both faces of b lie in those of a."""
+    if abs(a.normal @ b.normal) < PARALLEL:
+        return False
+    middle = np.asarray(b.region.representative_point().coords[0])
+    heights = a.to_board(b.to_world(np.array([[*middle, 0.0], [*middle, b.thickness.value]])))[:, 2]
+    return bool(np.abs(np.sort(heights) - [0.0, a.thickness.value]).max() < level)
+
+
+def _between(a: Polygon, b: Polygon, widest: float, ragged: float) -> Polygon | None:
+    """The gap between facing sides of two regions, empty where they overlap; None when they do not face each other."""
+    apart = a.distance(b)
+    if apart > widest:
+        return None
+    near_a, near_b = a.intersection(b.buffer(apart + ragged)), b.intersection(a.buffer(apart + ragged))
+    bridge = shapely.union_all([near_a, near_b]).convex_hull
+    narrower = min(_width(a), _width(b))
+    if a.intersection(b).area < 1.0 and min(near_a.length, near_b.length) / 2 < BESIDE * narrower:
+        return None
+    return bridge.difference(shapely.union_all([a, b]))
+
+
+def _width(region: Polygon) -> float:
+    """The smaller side of the smallest rectangle about a region."""
+    ring = np.asarray(region.minimum_rotated_rectangle.exterior.coords)
+    return float(np.linalg.norm(np.diff(ring[:3], axis=0), axis=1).min())
+
+
+def _is_rag(
+    a: Sheet, b: Sheet, other: Polygon, gap: Polygon, rest: Sequence[Sheet], scene: _Scene
+) -> bool:
+    """Whether a gap is one of the cloud, and not one between two boards; `other` is b's region in a's plane."""
+    points = scene.cloud.points
+    cut = a.to_board(points[np.concatenate([a.cut_idx, b.cut_idx])])[:, :2]
+    if _is_lined(gap, shapely.union_all([a.region, other]), cut, scene.near):
+        return False
+    faces = [a.to_board(points[np.concatenate([s.top_idx, s.bottom_idx])])[:, :2] for s in (a, b)]
+    thin = all(is_thin(gap, r, f, scene.near, scene.dense) for r, f in zip((a.region, other), faces, strict=True))
+    return thin and not is_seen(gap, a, scene.free) and not any(_runs_through(s, a, gap) for s in rest)
+
+
+def _is_lined(gap: Polygon, both: Polygon, cut: np.ndarray, near: float) -> bool:
+    """Whether cut-face points, (N, 2), lie along the outlines on both sides of a gap."""
+    shared = both.boundary.intersection(gap.buffer(0.05))
+    places = shapely.get_coordinates(shared.segmentize(near / 2)) if shared.length else np.zeros((0, 2))
+    if not len(places) or not len(cut):
+        return False
+    distance, _ = cKDTree(cut).query(places)
+    return float((distance < near).mean()) > LINED
+
+
+def _runs_through(sheet: Sheet, piece: Sheet, gap: Polygon) -> bool:
+    """Whether another board fills part of a gap, half way through the piece."""
+    places = shapely.get_coordinates(shapely.segmentize(gap.buffer(-0.5), 2.0))
+    inner = np.concatenate([places, [gap.representative_point().coords[0]]])
+    x = sheet.to_board(piece.to_world(np.c_[inner, np.full(len(inner), piece.thickness.value / 2)]))
+    inside = (x[:, 2] > 0) & (x[:, 2] < sheet.thickness.value) & shapely.contains_xy(sheet.region, x[:, 0], x[:, 1])
+    return float(inside.mean()) > THROUGH

@@ -1,0 +1,109 @@
+"""Boards that the cloud shows in rags: a stretcher in the shadow of a seat, a divider deep in a cabinet.
+
+Their faces have a hundredth of the points of others, too few for a region or to be worth a board's cost. But two small
+plane patches that face away from each other, one over the other, at a board's thickness, which no other board explains,
+are the two faces of one. How far it goes, assembly finds in the photographs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+import shapely
+
+from kerfwright.capture.types import Capture, Cloud
+from kerfwright.identify.freespace import FreeSpace
+from kerfwright.identify.options import IdentifyOptions
+from kerfwright.identify.primitives import Neighbourhood
+from kerfwright.identify.slabs import Slab, free_share, plane_frame
+from kerfwright.identify.thickness import ThicknessHypothesis
+from kerfwright.identify.types import Primitive
+
+__all__ = ["dark_slabs", "with_dark_boards"]
+
+SAME = 0.3  # of the smaller face's hull, that the larger one's must cover
+ELSEWHERE = 0.25  # of the faces' points at most that lie on boards already found
+CLEAR = 0.25  # of the interior at most that lies in them
+SITES = 400  # of the interior
+HULL = 500  # points of a patch, every n-th, that tell where it lies
+
+
+def dark_slabs(
+    capture: Capture, around: Neighbourhood, planes: Sequence[Primitive], free: FreeSpace, options: IdentifyOptions
+) -> list[Slab]:
+    """Slabs between two small patches that face away from each other, those with most points first."""
+    cloud, size = capture.cloud, capture.cloud.diameter
+    limits = options.min_thickness * size, options.max_thickness * size
+    enough = options.dark_density / around.spacing**2
+    opposite, found = -np.cos(np.radians(options.opposite_degrees)), []
+    for one, other in combinations(range(len(planes)), 2):
+        if planes[one].normal @ planes[other].normal > opposite:
+            continue
+        slab = _slab(planes, one, other, cloud, limits)
+        if slab is None or slab.region.area < (options.min_sheet_side * size) ** 2:
+            continue
+        points = sum(len(planes[k].point_idx) for k in (one, other))
+        if points < enough * 2 * slab.region.area and slab.cut_ratio < options.cut_area_ratio:
+            share = free_share(slab.world_from_board, slab.thickness.value, slab.region, free, 2 * around.spacing,
+                               options.free_sites)
+            if share <= options.max_free:
+                found.append((points, slab))
+    return [slab for _, slab in sorted(found, key=lambda entry: -entry[0])]
+
+
+def _slab(
+    planes: Sequence[Primitive], one: int, other: int, cloud: Cloud, limits: tuple[float, float]
+) -> Slab | None:
+    """The slab between two patches, if one lies over the other at a board's thickness."""
+    normal = planes[one].normal - planes[other].normal
+    frame = plane_frame(normal / np.linalg.norm(normal), planes[one].centroid)
+    picked = [planes[k].point_idx[:: max(1, len(planes[k].point_idx) // HULL)] for k in (one, other)]
+    x, y = ((cloud.points[idx] - frame[:3, 3]) @ frame[:3, :3] for idx in picked)
+    value = float(np.median(x[:, 2]) - np.median(y[:, 2]))
+    if not limits[0] < value < limits[1]:
+        return None
+    hulls = [shapely.MultiPoint(xy[:, :2]).convex_hull for xy in (x, y)]
+    both = hulls[0].intersection(hulls[1]).area
+    if both < SAME * min(hulls[0].area, hulls[1].area):
+        return None
+    frame[:3, 3] += np.median(y[:, 2]) * frame[:3, 2]
+    error = float(np.hypot(planes[one].sigma, planes[other].sigma))
+    thickness = ThicknessHypothesis(value, error, "opposite", float(both))
+    return Slab(frame, thickness, shapely.union_all(hulls).convex_hull, (one,), (other,), 0.0)
+
+
+def with_dark_boards(
+    chosen: Sequence[Slab], dark: Sequence[Slab], planes: Sequence[Primitive], cloud: Cloud, reach: float
+) -> list[Slab]:
+    """The chosen boards and those of the dark ones of which they explain nothing; reach: mm about a board that its own
+    points may lie.
+    """
+    boards = list(chosen)
+    for slab in dark:
+        points = cloud.points[np.concatenate([planes[k].point_idx for k in (*slab.top, *slab.bottom)])]
+        sites = slab.to_world(np.c_[_spread(slab, SITES), np.full(SITES, slab.thickness.value / 2)])
+        if _held(points, boards, reach) < ELSEWHERE and _held(sites, boards, 0.0) < CLEAR:
+            boards.append(slab)
+    return boards
+
+
+def _spread(slab: Slab, count: int) -> np.ndarray:
+    """(count, 2) places all over the region, always the same."""
+    low_x, low_y, high_x, high_y = slab.region.bounds
+    rng, found = np.random.default_rng(0), np.zeros((0, 2))
+    while len(found) < count:
+        xy = rng.uniform([low_x, low_y], [high_x, high_y], (4 * count, 2))
+        found = np.concatenate([found, xy[shapely.contains_xy(slab.region, xy[:, 0], xy[:, 1])]])
+    return found[:count]
+
+
+def _held(places: np.ndarray, boards: Sequence[Slab], reach: float) -> float:
+    """Share of (N, 3) places that lie in boards, or within `reach` mm of them."""
+    held = np.zeros(len(places), bool)
+    for board in boards:
+        x = board.to_board(places)
+        level = (x[:, 2] > -reach) & (x[:, 2] < board.thickness.value + reach)
+        held |= level & shapely.contains_xy(board.region.buffer(reach), x[:, 0], x[:, 1])
+    return float(held.mean())
