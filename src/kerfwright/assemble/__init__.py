@@ -27,6 +27,7 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     from kerfwright.assemble.backs import measured_backs
     from kerfwright.assemble.constraints import constraint_segments
     from kerfwright.assemble.contacts import to_contact
+    from kerfwright.assemble.covered import backed_by_ends
     from kerfwright.assemble.depths import remeasured
     from kerfwright.assemble.flush import flush_neighbours
     from kerfwright.assemble.gaps import mended
@@ -50,7 +51,7 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     else:
         sheets = remeasured(sheets, capture.cloud, photos, parts.noise)
     sheets = measured_backs(sheets, photos, diameter, options)
-    sheets = mended(sheets, capture.cloud, free, options)
+    sheets = backed_by_ends(mended(sheets, capture.cloud, free, options), diameter, options)
     sheets = flush_neighbours(share_thickness(sheets, diameter, options), diameter, options)
     sheets = laid_on(sheets, capture.cloud, free, options)
     sheets, decided, segments = _met(sheets, capture.cloud, photos, free, options)
