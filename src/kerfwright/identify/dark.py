@@ -8,6 +8,7 @@ are the two faces of one. How far it goes, assembly finds in the photographs.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -26,6 +27,9 @@ __all__ = ["dark_slabs", "with_dark_boards"]
 SAME = 0.3  # of the smaller face's hull, that the larger one's must cover
 ELSEWHERE = 0.25  # of the faces' points at most that lie on boards already found
 CLEAR = 0.25  # of the interior at most that lies in them
+PARALLEL = np.cos(np.radians(4.0))  # between rags of one board
+LEVEL = 1 / 250  # of D, between their middles, and between their thicknesses
+NEAR = 1 / 6  # of D, between their outlines
 SITES = 400  # of the interior
 HULL = 500  # points of a patch, every n-th, that tell where it lies
 
@@ -86,7 +90,32 @@ def with_dark_boards(
         sites = slab.to_world(np.c_[_spread(slab, SITES), np.full(SITES, slab.thickness.value / 2)])
         if _held(points, boards, reach) < ELSEWHERE and _held(sites, boards, 0.0) < CLEAR:
             boards.append(slab)
-    return boards
+    found = boards[len(chosen):]
+    return [*chosen, *_merged(found, cloud.diameter)]
+
+
+def _merged(found: list[Slab], size: float) -> list[Slab]:
+    """Rags of one board as one: those near each other between the same planes."""
+    for one, other in combinations(found, 2):
+        if _is_same_board(one, other, size):
+            region = shapely.union_all([one.region, _moved(other, one)]).convex_hull
+            whole = replace(one, region=region, top=one.top + other.top, bottom=one.bottom + other.bottom)
+            return _merged([whole if slab is one else slab for slab in found if slab is not other], size)
+    return found
+
+
+def _is_same_board(one: Slab, other: Slab, size: float) -> bool:
+    if abs(one.normal @ other.normal) < PARALLEL or one.region.distance(_moved(other, one)) > NEAR * size:
+        return False
+    middle = other.to_world(np.array([[*other.region.centroid.coords[0], other.thickness.value / 2]]))
+    off = abs(one.to_board(middle)[0, 2] - one.thickness.value / 2)
+    return max(off, abs(one.thickness.value - other.thickness.value)) < LEVEL * size
+
+
+def _moved(slab: Slab, to: Slab) -> shapely.Polygon:
+    """A slab's outline in another one's plane."""
+    xy = np.asarray(slab.region.exterior.coords)
+    return shapely.Polygon(to.to_board(slab.to_world(np.c_[xy, np.full(len(xy), slab.thickness.value / 2)]))[:, :2])
 
 
 def _spread(slab: Slab, count: int) -> np.ndarray:

@@ -40,6 +40,7 @@ __all__ = ["Slab", "candidate_slabs", "footprint", "free_share", "plane_frame"]
 CUT_FACE = 0.3  # cosine between a board's normal and that of its cut faces, at most
 ALONG_AXIS = 0.9  # cosine between a bar and the normal of a board across it, at least
 MOST_BESIDE = 0.6  # of a bar's section put beside it, that a board which parts it fills
+LEVEL = 0.999  # cosine between a level board's normal and the vertical
 CLEAR = 3.3  # strength of an edge that tells a thickness by itself
 CLEARER = 1.5  # times another edge's
 UNSEEN = ("cut", "twin", "inferred")  # evidence that no photograph and no opposite plane gave
@@ -107,7 +108,8 @@ def candidate_slabs(
     found = [slab for slab in found if slab.thickness.evidence not in UNSEEN or scene.is_broad(slab.region)]
     for k in known:
         if (k.told or not k.hypotheses) and scene.is_broad(k.piece):
-            rough = [slab for h in k.hypotheses or stock for slab in _slabs(scene, k.top, k.frame, k.piece, h)]
+            guesses = k.hypotheses or [_above_floor(h, k.frame, scene) for h in stock]
+            rough = [slab for h in guesses for slab in _slabs(scene, k.top, k.frame, k.piece, h)]
             found.extend(piece for slab in rough for piece in _without_others(scene, slab, found))
     return _distinct([*found, *_bars(scene, found)])
 
@@ -300,10 +302,18 @@ def _looked_at(scene: _Scene, seed: _Seed) -> Known:
     if not found and not scene.photos.views:
         found = from_cut_faces(frame, piece, cloud, around, (low, high))
     height = frame[2, 3]
-    level = frame[2, 2] > 0.999 and low < height < high and not any(h.near(height) for h in found)
+    level = frame[2, 2] > LEVEL and low < height < high and not any(h.near(height) for h in found)
     if level and not _ends_above(photos, height) and reaches_ground(frame, piece, cloud, around, height):
         found.append(ThicknessHypothesis(float(height), 2 * around.noise, "ground", piece.area))
     return Known(top, frame, piece, rim, tuple(found))
+
+
+def _above_floor(guess: ThicknessHypothesis, frame: np.ndarray, scene: _Scene) -> ThicknessHypothesis:
+    """A guessed thickness, or the height above the floor of a level board that would go through it."""
+    height = float(frame[2, 3])
+    if frame[2, 2] < LEVEL or not scene.thickness_limits[0] < height < guess.value:
+        return guess
+    return ThicknessHypothesis(height, 2 * scene.around.noise, "ground", guess.support)
 
 
 def _ends_above(photos: list[ThicknessHypothesis], height: float) -> bool:

@@ -13,11 +13,13 @@ from typing import Protocol
 import numpy as np
 from shapely.geometry import Polygon
 
+from kerfwright.capture.types import Capture
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.options import IdentifyOptions
 from kerfwright.identify.photo_edges import Photos
+from kerfwright.identify.primitives import Neighbourhood
 from kerfwright.identify.rims import Rim
-from kerfwright.identify.thickness import ThicknessHypothesis, from_photos
+from kerfwright.identify.thickness import ThicknessHypothesis, from_cut_faces, from_photos
 
 __all__ = ["Known", "told_by_others"]
 
@@ -25,6 +27,8 @@ FAINT = 2.0  # strength of an edge that counts when another board shows it too
 ALIKE = 0.04  # relative difference of two thicknesses that may be one
 SAME_SIZE = 0.05  # relative difference of the sides of two boards that may be twins
 SAME_AREA = 0.7  # least share of a twin's area: the front edges of a case make a frame as large as its sides
+THICK = 1 / 20  # of D; cut faces that go deeper are those of other boards beside
+CUT_ERROR = 0.15  # relative standard error of a thickness that only cut faces in the cloud tell
 TWIN_ERROR = 0.05  # relative standard error of a thickness that a twin told
 
 
@@ -52,6 +56,8 @@ class Known:
 
 
 class _Scene(Protocol):
+    capture: Capture
+    around: Neighbourhood
     photos: Photos
     free: FreeSpace
     options: IdentifyOptions
@@ -77,16 +83,34 @@ def told_by_others(known: list[Known], scene: _Scene) -> list[Known]:
         twin = None if out[i].hypotheses else _twin(out[i], out)
         if twin is not None:
             told[i] = replace(out[i], hypotheses=(twin,), told=True)
+        elif not out[i].hypotheses and (seen := _by_cut_faces(out[i], scene)) is not None:
+            told[i] = replace(out[i], hypotheses=(seen,), told=True)
     return told
 
 
 def _faint(known: Known, scene: _Scene) -> list[ThicknessHypothesis]:
-    """Edges in the photographs that show the cut face itself, clear ones and faint ones."""
-    found = from_photos(
-        known.frame, known.rim, scene.photos, scene.thickness_limits,
-        step=scene.diameter * scene.options.sweep_step, free=scene.free,
+    """Edges in the photographs that show the cut face itself, clear ones and faint ones; then those that other boards
+    may hide, thought away.
+    """
+    found = [
+        from_photos(
+            known.frame, known.rim, scene.photos, scene.thickness_limits,
+            step=scene.diameter * scene.options.sweep_step, free=free,
+        )
+        for free in (scene.free, None)
+    ]
+    return [h for way in found for h in way if h.support > FAINT]
+
+
+def _by_cut_faces(known: Known, scene: _Scene) -> ThicknessHypothesis | None:
+    """Where the cloud's points on the cut faces end: rough, for stereo blurs both edges, but seen."""
+    found = from_cut_faces(
+        known.frame, known.piece, scene.capture.cloud, scene.around, (scene.thickness_limits[0], THICK * scene.diameter)
     )
-    return [h for h in found if h.support > FAINT]
+    if not found:
+        return None
+    best = max(found, key=lambda h: h.support)
+    return replace(best, standard_error=max(best.standard_error, CUT_ERROR * best.value))
 
 
 def _twin(known: Known, others: list[Known]) -> ThicknessHypothesis | None:
