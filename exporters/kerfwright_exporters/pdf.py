@@ -10,17 +10,21 @@ import numpy as np
 from kerfwright.model import Model
 from kerfwright.model.geometry import sample_loop
 from kerfwright_exporters.cutlist import length_text
-from kerfwright_exporters.dimensions import Dimension, sheet_dimensions
+from kerfwright_exporters.dimensions import LEAST_HEIGHT, Dimension, laid_polygon, sheet_dimensions
+from kerfwright_exporters.drawing import text_room, upright
 from kerfwright_exporters.naming import STAMP, ascii_name, title
 from kerfwright_exporters.options import ExportOptions
 
 if TYPE_CHECKING:
+    from shapely.geometry import Polygon
+
     from kerfwright_exporters.sheets import LaidBoard, Sheet
 
-__all__ = ["sheet_scale", "sheets_pdf"]
+__all__ = ["label_room", "sheet_scale", "sheets_pdf"]
 
 PAGE = (297.0, 210.0)  # A4 across, mm
 BORDER, HEAD = 12.0, 16.0  # mm round the drawing, and for the title above it
+LABEL_HEIGHTS = (3.0, 2.5, 2.1, 1.8, 1.5, 1.2, 1.0, 0.8)  # mm of paper, the largest that fits is taken
 SCALES = (1, 2, 5, 10, 20, 25, 50, 100)
 _COLOURS = {"outside": (0, 0, 0), "inside": (0, 0, 0.8), "bevel": (0.8, 0, 0)}
 
@@ -91,7 +95,7 @@ def _board(canvas: Any, board: LaidBoard, scale: int, options: ExportOptions) ->
         if text.operation == "label":
             _label(canvas, board, text, scale, options)
         elif text.operation == "bevel":
-            _text(canvas, text.text, np.array(text.at) / scale, max(1.2, text.height / scale), text.turn)
+            _text(canvas, text.text, np.array(text.at) / scale, max(LEAST_HEIGHT, text.height / scale), text.turn)
 
 
 def _outline(canvas: Any, points: np.ndarray) -> None:
@@ -104,18 +108,25 @@ def _outline(canvas: Any, points: np.ndarray) -> None:
 
 
 def _label(canvas: Any, board: LaidBoard, text: Any, scale: int, options: ExportOptions) -> None:
-    """Name and size, one above the other, along the board's longer side as it lies."""
-    at = np.array(text.at) / scale
-    size = " x ".join(length_text(v, options) for v in board.size)
-    height = float(np.clip(0.35 * min(board.size) / scale, 1.2, 3.0))
-    length = max(board.size) / scale
-    height = min(height, max(0.8, 1.6 * length / max(len(size), len(_shown(board.name, board.stem)))))
-    turn = text.turn if board.size[0] >= board.size[1] else text.turn + np.pi / 2
-    if np.cos(turn) < -1e-6 or np.sin(turn) < -0.999:  # never upside down
-        turn += np.pi
+    """Name and size, one above the other, along the board's longer side as it lies, clear of its holes."""
+    lines = [_shown(board.name, board.stem), " x ".join(length_text(v, options) for v in board.size)]
+    turn = text.turn if board.size[0] >= board.size[1] else upright(text.turn + np.pi / 2)
+    at, height = label_room(laid_polygon(board), lines, turn, scale)
     up = np.array([-np.sin(turn), np.cos(turn)])
-    _text(canvas, _shown(board.name, board.stem), at + 0.65 * height * up, height, turn)
-    _text(canvas, size, at - 0.65 * height * up, 0.85 * height, turn)
+    _text(canvas, lines[0], at / scale + 0.65 * height * up, height, turn)
+    _text(canvas, lines[1], at / scale - 0.65 * height * up, 0.85 * height, turn)
+
+
+def label_room(polygon: Polygon, lines: list[str], turn: float, scale: int) -> tuple[np.ndarray, float]:
+    """Where two turned lines of text fit on a board, mm of the board, and their height, mm of paper."""
+    from reportlab.pdfbase.pdfmetrics import stringWidth
+    from shapely import affinity
+
+    turned = affinity.rotate(polygon, -turn, origin=(0, 0), use_radians=True)
+    width = 0.5 + max(stringWidth(line, "Helvetica", 1) for line in lines)
+    (x, y), height = text_room(turned, width, 2.6, [scale * h for h in LABEL_HEIGHTS])
+    c, s = np.cos(turn), np.sin(turn)
+    return np.array([c * x - s * y, s * x + c * y]), height / scale
 
 
 def _shown(name: str, otherwise: str) -> str:

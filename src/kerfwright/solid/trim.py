@@ -2,7 +2,8 @@
 
 Fits leave slits where an outline doubles back on itself, and outlines hundredths of a millimetre inside the boards
 beside them. Where a board ends on another's sheet, the whole edge is put on that sheet; elsewhere only what lies in the
-neighbour goes. A board that ends on one sheet only is then moved onto it, within its own plane. Deeper overlaps are no slip of a fit and are left for the checker to report.
+neighbour goes. A board that ends on one sheet only is then moved onto it, within its own plane. Deeper overlaps are no
+slip of a fit and are left for the checker to report.
 """
 
 from __future__ import annotations
