@@ -51,6 +51,15 @@ class Dimension:
         stroke = 0.3 * self.height * (along + np.array([-along[1], along[0]]))
         return [(start, end), (start - stroke, start + stroke), (end - stroke, end + stroke)]
 
+    @property
+    def room(self) -> BaseGeometry:
+        """What the line and its figure cover."""
+        import shapely
+
+        across = int(self.turn != 0)
+        figure = _figure_box(across, self.at[across], self.at[1 - across], len(self.text), self.height)
+        return shapely.LineString([self.start, self.end]).buffer(0.2 * self.height).union(figure)
+
 
 def sheet_dimensions(sheet: Sheet, scale: float, options: ExportOptions) -> Iterator[Dimension]:
     """All dimensions of a sheet that is drawn at 1:scale."""

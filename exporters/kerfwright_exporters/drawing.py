@@ -22,6 +22,7 @@ from kerfwright_exporters.relief import relieved_path
 
 if TYPE_CHECKING:
     from shapely.geometry import Polygon
+    from shapely.geometry.base import BaseGeometry
 
 __all__ = [
     "BevelLine", "Cut", "Drawing", "Text", "board_drawing", "cutting_path", "moved_drawing", "outline_polygon",
@@ -138,7 +139,7 @@ def _texts(board: Board, path: CutPath, bevels: tuple[BevelLine, ...], options: 
 
 
 def text_room(
-    polygon: Polygon, width: float, height: float, sizes: Sequence[float]
+    polygon: BaseGeometry, width: float, height: float, sizes: Sequence[float]
 ) -> tuple[tuple[float, float], float]:
     """Where text fits on the board, centred, and the first of the sizes of letters that keeps it on it, mm.
 
@@ -156,13 +157,14 @@ def text_room(
     return tuple(map(float, centres[1])), sizes[-1]
 
 
-def _centres(polygon: Polygon) -> Iterator[tuple[float, float]]:
+def _centres(polygon: BaseGeometry) -> Iterator[tuple[float, float]]:
     """Where text may be centred: the centroid, the middle of the largest circle, a grid from the centroid out."""
     import shapely
 
     middle = np.array(polygon.centroid.coords[0])
     yield tuple(middle)
-    yield shapely.maximum_inscribed_circle(polygon, tolerance=1.0).coords[0]
+    largest = max(shapely.get_parts(polygon), key=shapely.area)
+    yield shapely.maximum_inscribed_circle(largest, tolerance=1.0).coords[0]
     x, y = (np.linspace(low, high, GRID) for low, high in np.reshape(polygon.bounds, (2, 2)).T)
     grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     yield from grid[np.argsort(np.hypot(*(grid - middle).T), kind="stable")]

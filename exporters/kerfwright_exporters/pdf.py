@@ -16,8 +16,9 @@ from kerfwright_exporters.naming import STAMP, ascii_name, title
 from kerfwright_exporters.options import ExportOptions
 
 if TYPE_CHECKING:
-    from shapely.geometry import Polygon
+    from shapely.geometry.base import BaseGeometry
 
+    from kerfwright_exporters.drawing import Text
     from kerfwright_exporters.sheets import LaidBoard, Sheet
 
 __all__ = ["label_room", "sheet_scale", "sheets_pdf"]
@@ -46,6 +47,8 @@ def sheets_pdf(model: Model, sheets: list[Sheet], options: ExportOptions) -> byt
 
 
 def _page(canvas: Any, model: Model, sheet: Sheet, options: ExportOptions) -> None:
+    import shapely
+
     from kerfwright_exporters.sheets import caption
 
     scale = sheet_scale(sheet)
@@ -61,10 +64,12 @@ def _page(canvas: Any, model: Model, sheet: Sheet, options: ExportOptions) -> No
     canvas.setLineWidth(0.25)
     canvas.setStrokeColorRGB(0.5, 0.5, 0.5)
     canvas.rect(0, 0, sheet.length / scale, sheet.width / scale)
-    for board in sheet.boards:
-        _board(canvas, board, scale, options)
-    for dimension in sheet_dimensions(sheet, scale, options):
+    dimensions = list(sheet_dimensions(sheet, scale, options))
+    for dimension in dimensions:
         _dimension(canvas, dimension, scale)
+    taken = shapely.union_all([dimension.room for dimension in dimensions])
+    for board in sheet.boards:
+        _board(canvas, board, taken, scale, options)
 
 
 def _dimension(canvas: Any, dimension: Dimension, scale: int) -> None:
@@ -82,7 +87,7 @@ def sheet_scale(sheet: Sheet) -> int:
     return next((s for s in SCALES if s >= needed), SCALES[-1])
 
 
-def _board(canvas: Any, board: LaidBoard, scale: int, options: ExportOptions) -> None:
+def _board(canvas: Any, board: LaidBoard, taken: BaseGeometry, scale: int, options: ExportOptions) -> None:
     canvas.setLineWidth(0.2)
     for cut in board.drawing.cuts:
         if cut.operation in _COLOURS:
@@ -93,7 +98,7 @@ def _board(canvas: Any, board: LaidBoard, scale: int, options: ExportOptions) ->
         canvas.line(*(np.array([*bevel.start, *bevel.end]) / scale))
     for text in board.drawing.texts:
         if text.operation == "label":
-            _label(canvas, board, text, scale, options)
+            _label(canvas, board, text, laid_polygon(board).difference(taken), scale, options)
         elif text.operation == "bevel":
             _text(canvas, text.text, np.array(text.at) / scale, max(LEAST_HEIGHT, text.height / scale), text.turn)
 
@@ -107,22 +112,22 @@ def _outline(canvas: Any, points: np.ndarray) -> None:
     canvas.drawPath(path)
 
 
-def _label(canvas: Any, board: LaidBoard, text: Any, scale: int, options: ExportOptions) -> None:
-    """Name and size, one above the other, along the board's longer side as it lies, clear of its holes."""
+def _label(canvas: Any, board: LaidBoard, text: Text, free: BaseGeometry, scale: int, options: ExportOptions) -> None:
+    """Name and size, one above the other, along the board's longer side as it lies, where it is free."""
     lines = [_shown(board.name, board.stem), " x ".join(length_text(v, options) for v in board.size)]
     turn = text.turn if board.size[0] >= board.size[1] else upright(text.turn + np.pi / 2)
-    at, height = label_room(laid_polygon(board), lines, turn, scale)
+    at, height = label_room(free, lines, turn, scale)
     up = np.array([-np.sin(turn), np.cos(turn)])
     _text(canvas, lines[0], at / scale + 0.65 * height * up, height, turn)
     _text(canvas, lines[1], at / scale - 0.65 * height * up, 0.85 * height, turn)
 
 
-def label_room(polygon: Polygon, lines: list[str], turn: float, scale: int) -> tuple[np.ndarray, float]:
+def label_room(free: BaseGeometry, lines: list[str], turn: float, scale: int) -> tuple[np.ndarray, float]:
     """Where two turned lines of text fit on a board, mm of the board, and their height, mm of paper."""
     from reportlab.pdfbase.pdfmetrics import stringWidth
     from shapely import affinity
 
-    turned = affinity.rotate(polygon, -turn, origin=(0, 0), use_radians=True)
+    turned = affinity.rotate(free, -turn, origin=(0, 0), use_radians=True)
     width = 0.5 + max(stringWidth(line, "Helvetica", 1) for line in lines)
     (x, y), height = text_room(turned, width, 2.6, [scale * h for h in LABEL_HEIGHTS])
     c, s = np.cos(turn), np.sin(turn)
