@@ -7,6 +7,8 @@ import numpy as np
 
 __all__ = ["place_all"]
 
+_inner = numba.njit(cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)  # see _separation
+
 
 @numba.njit(cache=True)
 def place_all(order, runs, starts, turns, free):
@@ -24,14 +26,14 @@ def place_all(order, runs, starts, turns, free):
     -------
     Sheet, turn, column, cell and column after the last of every board, each (N,); sheet -1 where no sheet has room.
     """
-    count, cells = len(order), free.shape[2]
-    places = np.full((5, count), -1, np.int64)
+    places = np.empty((5, len(order)), np.int64)
     sheet, turn, x, y, end = places[0], places[1], places[2], places[3], places[4]
     used = 0
     for board in order:
+        sheet[board] = -1
         for s in range(free.shape[0]):
             if s == used:
-                free[s] = cells
+                _clear(free[s])
                 used += 1
             best = free.shape[1] + 1
             for t in range(turns):
@@ -48,12 +50,21 @@ def place_all(order, runs, starts, turns, free):
     return sheet, turn, x, y, end
 
 
-@numba.njit(cache=True)
+@_inner
+def _clear(free):
+    columns, cells = free.shape
+    for x in range(columns):
+        for y in range(cells):
+            free[x, y] = cells
+
+
+@_inner
 def _first_place(free, shape, limit):
     """Leftmost column, then lowest cell, where the shape fits and ends no further right than the limit."""
     columns, cells = free.shape
-    wide = shape[:, 0].max() + 1
-    high = shape[:, 2].max()
+    wide, high = 0, 0
+    for k in range(len(shape)):
+        wide, high = max(wide, shape[k, 0] + 1), max(high, shape[k, 2])
     for x in range(min(columns, limit) - wide + 1):
         y = 0
         while y + high <= cells:
@@ -70,7 +81,7 @@ def _first_place(free, shape, limit):
     return -1, -1, limit + 1
 
 
-@numba.njit(cache=True)
+@_inner
 def _occupy(free, shape, x, y):
     """Mark the shape's cells as occupied."""
     for k in range(len(shape)):

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-__all__ = ["disrupt", "overlaps", "separate", "squeeze"]
+__all__ = ["separate"]
 
 SNUG = 1e-7  # mm that parts may reach into each other: rounding
 PROBES, NEAR_PROBES, KEPT = (
@@ -23,8 +23,12 @@ LEAST_STEP = 2e-3  # mm, at which looking closer ends
 HARDER, SOFTER = 1.8, 0.95  # how the weight of the worst pair grows, and of a pair that is apart shrinks
 PATIENCE = 100  # rounds without a better layout after which separation gives up
 
+# Compiled without a way in from Python; with loops for numpy's functions, which each compile a dozen more: the first
+# run of an installation waits for all of it.
+_inner = numba.njit(cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
-@numba.njit(cache=True)
+
+@_inner
 def _parts_overlap(verts, normals, reach, first, after, p, q, dx, dy):
     """How far two convex parts would have to move apart, q shifted by dx, dy against p; 0 when they are."""
     least = np.inf
@@ -49,7 +53,7 @@ def _parts_overlap(verts, normals, reach, first, after, p, q, dx, dy):
     return least
 
 
-@numba.njit(cache=True)
+@_inner
 def _overlap(shapes, a, xa, ya, b, xb, yb):
     """How much shape a at xa, ya and shape b at xb, yb overlap."""
     verts, normals, reach, first, after, boxes, parts, sizes = shapes
@@ -69,7 +73,7 @@ def _overlap(shapes, a, xa, ya, b, xb, yb):
     return total
 
 
-@numba.njit(cache=True)
+@_inner
 def _cost(shapes, turns, board, turn, sheet, x, y, layout, weights, bound):
     """Weighted overlap of a board there with all others on the sheet; infinite as soon as it passes the bound."""
     sheets, turned, xs, ys = layout
@@ -85,22 +89,7 @@ def _cost(shapes, turns, board, turn, sheet, x, y, layout, weights, bound):
     return total
 
 
-@numba.njit(cache=True)
-def overlaps(shapes, turns, layout):
-    """(N, N) overlap of every pair."""
-    sheets, turned, xs, ys = layout
-    count = len(sheets)
-    found = np.zeros((count, count))
-    for a in range(count):
-        for b in range(a + 1, count):
-            if sheets[a] == sheets[b]:
-                shapes_ab = a * turns + turned[a], b * turns + turned[b]
-                found[a, b] = _overlap(shapes, shapes_ab[0], xs[a], ys[a], shapes_ab[1], xs[b], ys[b])
-                found[b, a] = found[a, b]
-    return found
-
-
-@numba.njit(cache=True)
+@_inner
 def _descend(shapes, turns, board, turn, sheet, x, y, cost, room, layout, weights):
     """The place near x, y that costs least: steps along and across, shorter and shorter."""
     step_x, step_y = 0.06 * room[0], 0.06 * room[1]
@@ -127,24 +116,35 @@ def _descend(shapes, turns, board, turn, sheet, x, y, cost, room, layout, weight
     return x, y, cost
 
 
-@numba.njit(cache=True)
+@_inner
 def _room(shapes, turns, board, turn, lengths, width, sheet):
     """How far a board can be shifted on a sheet, along and across."""
     size = shapes[7][board * turns + turn]
     return lengths[sheet] - size[0], width - size[1]
 
 
-@numba.njit(cache=True)
+@_inner
 def _note(row, turn, sheet, x, y, cost):
     row[0], row[1], row[2], row[3], row[4] = turn, sheet, x, y, cost
 
 
-@numba.njit(cache=True)
+@_inner
+def _dearest(places):
+    """Which of the places costs most."""
+    worst = 0
+    for k in range(1, KEPT):
+        if places[k, 4] > places[worst, 4]:
+            worst = k
+    return worst
+
+
+@_inner
 def _move(shapes, turns, board, lengths, width, layout, weights):
     """Put a board where it costs least of the places tried; the places it was at count as well."""
     sheets, turned, xs, ys = layout
     best = np.empty((KEPT, 5))
-    best[:] = np.inf
+    for k in range(KEPT):
+        _note(best[k], 0, 0, 0.0, 0.0, np.inf)
     now = _cost(shapes, turns, board, turned[board], sheets[board], xs[board], ys[board], layout, weights, np.inf)
     _note(best[0], turned[board], sheets[board], xs[board], ys[board], now)
     for k in range(PROBES + NEAR_PROBES):
@@ -159,7 +159,7 @@ def _move(shapes, turns, board, lengths, width, layout, weights):
             size = shapes[7][board * turns + turn]
             x = min(max(xs[board] + (np.random.random() - 0.5) * size[0] * 0.5, 0.0), room[0])
             y = min(max(ys[board] + (np.random.random() - 0.5) * size[1] * 0.5, 0.0), room[1])
-        worst = best[:, 4].argmax()
+        worst = _dearest(best)
         found = _cost(shapes, turns, board, turn, sheet, x, y, layout, weights, best[worst, 4])
         if found < best[worst, 4]:
             _note(best[worst], turn, sheet, x, y, found)
@@ -178,7 +178,7 @@ def _move(shapes, turns, board, lengths, width, layout, weights):
     xs[board], ys[board] = best[chosen, 2], best[chosen, 3]
 
 
-@numba.njit(cache=True)
+@_inner
 def _refresh(shapes, turns, board, layout, found):
     sheets, turned, xs, ys = layout
     a = board * turns + turned[board]
@@ -211,77 +211,58 @@ def separate(shapes, turns, lengths, width, layout, weights, seed, moves):
     Whether they are apart, and the moves that are left.
     """
     np.random.seed(seed)
-    found = overlaps(shapes, turns, layout)
-    least, idle = found.sum(), 0
-    count = len(found)
+    count = len(weights)
+    found, order = np.empty((count, count)), np.empty(count, np.int64)
+    for board in range(count):
+        order[board] = board
+        _refresh(shapes, turns, board, layout, found)
+    total, worst = _total_and_worst(found)
+    least, idle = total, 0
     while least > 0 and idle < PATIENCE and moves > 0:
-        for board in np.random.permutation(count):
-            if found[board].max() > 0:
-                _move(shapes, turns, board, lengths, width, layout, weights)
-                _refresh(shapes, turns, board, layout, found)
+        _shuffle(order)
+        for k in range(count):
+            if _worst_of(found[order[k]]) > 0:
+                _move(shapes, turns, order[k], lengths, width, layout, weights)
+                _refresh(shapes, turns, order[k], layout, found)
                 moves -= 1
-        worst = found.max()
-        for a in range(count):
-            for b in range(count):
-                if found[a, b] > 0:
-                    weights[a, b] *= 1.2 + (HARDER - 1.2) * found[a, b] / worst
-                else:
-                    weights[a, b] = max(1.0, weights[a, b] * SOFTER)
-        total = found.sum()
+        total, worst = _total_and_worst(found)
+        _reweigh(weights, found, worst)
         idle = 0 if total < 0.98 * least else idle + 1
         least = min(least, total)
-    return found.max() == 0, moves
+    return worst == 0, moves
 
 
-@numba.njit(cache=True)
-def squeeze(shapes, turns, lengths, width, layout, seed):
-    """Push boards that stand out of their sheets back onto them, turned or on another sheet if they do not fit.
-
-    Returns whether there is a sheet for each.
-    """
-    np.random.seed(seed)
-    sheets, turned, xs, ys = layout
-    for board in range(len(sheets)):
-        gone = sheets[board] >= len(lengths)
-        if not gone and _fits(_room(shapes, turns, board, turned[board], lengths, width, sheets[board])):
-            room = _room(shapes, turns, board, turned[board], lengths, width, sheets[board])
-            xs[board], ys[board] = max(0.0, min(xs[board], room[0])), max(0.0, min(ys[board], room[1]))
-        elif not _resettle(shapes, turns, board, lengths, width, layout):
-            return False
-    return True
+@_inner
+def _shuffle(order):
+    for k in range(len(order) - 1, 0, -1):
+        other = np.random.randint(k + 1)
+        order[k], order[other] = order[other], order[k]
 
 
-@numba.njit(cache=True)
-def _fits(room):
-    return room[0] >= 0 and room[1] >= 0
+@_inner
+def _worst_of(row):
+    worst = 0.0
+    for k in range(len(row)):
+        worst = max(worst, row[k])
+    return worst
 
 
-@numba.njit(cache=True)
-def _resettle(shapes, turns, board, lengths, width, layout):
-    """Put a board anywhere on any sheet, at any turn, where it fits; its own sheet first."""
-    sheets, turned, xs, ys = layout
-    for sheet in np.append(np.array([min(sheets[board], len(lengths) - 1)]), np.random.permutation(len(lengths))):
-        for turn in np.random.permutation(turns):
-            room = _room(shapes, turns, board, turn, lengths, width, sheet)
-            if _fits(room):
-                sheets[board], turned[board] = sheet, turn
-                xs[board], ys[board] = np.random.random() * room[0], np.random.random() * room[1]
-                return True
-    return False
+@_inner
+def _total_and_worst(found):
+    total, worst = 0.0, 0.0
+    for a in range(len(found)):
+        for b in range(len(found)):
+            total += found[a, b]
+        worst = max(worst, _worst_of(found[a]))
+    return total, worst
 
 
-@numba.njit(cache=True)
-def disrupt(shapes, turns, lengths, width, layout, areas, seed):
-    """Let two large boards change places."""
-    np.random.seed(seed)
-    sheets, _, xs, ys = layout
-    count = len(sheets)
-    order = np.argsort(-areas)
-    large = max(2, count // 3)
-    a = order[np.random.randint(large)]
-    b = order[np.random.randint(large)]
-    while b == a:
-        b = order[np.random.randint(count)]
-    sheets[a], sheets[b] = sheets[b], sheets[a]
-    xs[a], xs[b] = xs[b], xs[a]
-    ys[a], ys[b] = ys[b], ys[a]
+@_inner
+def _reweigh(weights, found, worst):
+    """Pairs that overlap weigh more, the worst the most, and pairs that are apart less."""
+    for a in range(len(found)):
+        for b in range(len(found)):
+            if found[a, b] > 0:
+                weights[a, b] *= 1.2 + (HARDER - 1.2) * found[a, b] / worst
+            else:
+                weights[a, b] = max(1.0, weights[a, b] * SOFTER)

@@ -5,7 +5,7 @@ Board frame seen from the top: x to the right, y up, millimetres.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -22,12 +22,17 @@ from kerfwright_exporters.relief import relieved_path
 
 if TYPE_CHECKING:
     from shapely.geometry import Polygon
+    from shapely.geometry.base import BaseGeometry
 
-__all__ = ["BevelLine", "Cut", "Drawing", "Text", "board_drawing", "cutting_path", "moved_drawing", "outline_polygon"]
+__all__ = [
+    "BevelLine", "Cut", "Drawing", "Text", "board_drawing", "cutting_path", "moved_drawing", "outline_polygon",
+    "text_room", "upright",
+]  # fmt: skip
 
 CHORD = 0.01  # mm between an arc and its chords, when it is asked whether arcs cross
 FINER = 10  # halvings of the tolerance of arcs, down to a twentieth of a micrometre
 LETTER_WIDTH = 0.95  # of a letter's height, with the space after it, in the widest of the usual fonts
+GRID = 25  # places across a board and along it where a label is tried
 TEXT_HEIGHTS = (12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.5, 2.0, 1.5)  # mm, the largest that fits is taken
 
 
@@ -126,27 +131,43 @@ def _tool_path(cut: Cut, distance: float, name: str) -> Cut:
 def _texts(board: Board, path: CutPath, bevels: tuple[BevelLine, ...], options: ExportOptions) -> Iterator[Text]:
     polygon = outline_polygon(path, 0.1)
     lines = [plain_name(board.name), *([STAMP] if options.unverified else [])]
-    (x, y), size = _room(polygon, lines)
+    (x, y), size = text_room(polygon, LETTER_WIDTH * max(map(len, lines)), 1.5 * len(lines), TEXT_HEIGHTS)
     for row, (operation, text) in enumerate(zip(("label", "stamp"), lines, strict=False)):
         yield Text(operation, text, (x, y + (0.75 * (len(lines) - 1) - 1.5 * row) * size), size)
     for (start, end), angles in _by_stretch(bevels).items():
         yield _bevel_text(start, end, angles, size)
 
 
-def _room(polygon: Polygon, lines: list[str]) -> tuple[tuple[float, float], float]:
-    """Where the lines of text fit on the board, centred, and the largest height that keeps them on it, mm."""
+def text_room(
+    polygon: BaseGeometry, width: float, height: float, sizes: Sequence[float]
+) -> tuple[tuple[float, float], float]:
+    """Where text fits on the board, centred, and the first of the sizes of letters that keeps it on it, mm.
+
+    Width and height are those of all the text, as multiples of its size.
+    """
     import shapely
 
-    widest = LETTER_WIDTH * max(len(line) for line in lines)
-    rows = 1.5 * len(lines)
-    inscribed = shapely.maximum_inscribed_circle(polygon, tolerance=1.0).coords
-    centres = (polygon.centroid.coords[0], inscribed[0], polygon.representative_point().coords[0])
-    for size in TEXT_HEIGHTS:
-        for x, y in centres:
-            half_width, half_height = size * widest / 2, size * rows / 2
-            if polygon.covers(shapely.box(x - half_width, y - half_height, x + half_width, y + half_height)):
-                return (x, y), size
-    return inscribed[0], TEXT_HEIGHTS[-1]
+    centres = np.array(list(_centres(polygon)))
+    for size in sizes:
+        half = np.array([width, height]) * size / 2
+        fits = shapely.covers(polygon, shapely.box(*(centres - half).T, *(centres + half).T))
+        if fits.any():
+            x, y = centres[int(fits.argmax())]
+            return (float(x), float(y)), size
+    return tuple(map(float, centres[1])), sizes[-1]
+
+
+def _centres(polygon: BaseGeometry) -> Iterator[tuple[float, float]]:
+    """Where text may be centred: the centroid, the middle of the largest circle, a grid from the centroid out."""
+    import shapely
+
+    middle = np.array(polygon.centroid.coords[0])
+    yield tuple(middle)
+    largest = max(shapely.get_parts(polygon), key=shapely.area)
+    yield shapely.maximum_inscribed_circle(largest, tolerance=1.0).coords[0]
+    x, y = (np.linspace(low, high, GRID) for low, high in np.reshape(polygon.bounds, (2, 2)).T)
+    grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    yield from grid[np.argsort(np.hypot(*(grid - middle).T), kind="stable")]
 
 
 def _by_stretch(bevels: tuple[BevelLine, ...]) -> dict[tuple, list[float]]:
@@ -165,10 +186,14 @@ def _bevel_text(start: tuple[float, float], end: tuple[float, float], angles: li
     text = "BEVEL " + " ".join(f"{angle:+.1f}" for angle in angles)
     height = float(min(size, 0.9 * length / (LETTER_WIDTH * len(text))))
     at = (first + last) / 2 + height * np.array([-along[1], along[0]])
-    turn = float(np.arctan2(along[1], along[0]))
-    if abs(turn) > np.pi / 2 + 1e-9:  # never upside down
-        turn -= np.sign(turn) * np.pi
+    turn = upright(float(np.arctan2(along[1], along[0])))
     return Text("bevel", text, (float(at[0]), float(at[1])), height, turn)
+
+
+def upright(turn: float) -> float:
+    """The turn of a line of text, or its opposite, so that it reads from the left or from below."""
+    turn = (turn + np.pi) % (2 * np.pi) - np.pi
+    return turn if -np.pi / 2 + 1e-3 < turn < np.pi / 2 + 1e-3 else turn - np.sign(turn) * np.pi
 
 
 def moved_drawing(drawing: Drawing, target_from_board: np.ndarray) -> Drawing:
@@ -183,5 +208,5 @@ def moved_drawing(drawing: Drawing, target_from_board: np.ndarray) -> Drawing:
     return Drawing(
         tuple(Cut(c.operation, transform_loop(c.loop, m), c.depth) for c in drawing.cuts),
         tuple(BevelLine(at(b.start), at(b.end), b.angle) for b in drawing.bevels),
-        tuple(Text(t.operation, t.text, at(t.at), t.height, t.turn + turn) for t in drawing.texts),
+        tuple(Text(t.operation, t.text, at(t.at), t.height, upright(t.turn + turn)) for t in drawing.texts),
     )

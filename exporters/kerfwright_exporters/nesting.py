@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kerfwright_exporters._separation import disrupt, separate, squeeze
+from kerfwright_exporters._separation import separate
 from kerfwright_exporters.bottom_left import first_places
 from kerfwright_exporters.convex import convex_parts
 from kerfwright_exporters.places import NestOptions, Place
@@ -178,7 +178,7 @@ class _Search:
             if goal.lengths[-1] < least:
                 break
             if failures and not compressing:
-                disrupt(*self._on(goal), self.areas, self._number())
+                self._disrupt(goal)
             if self._apart(goal, self.moves):
                 best, failures = goal, 0
                 best.lengths[-1] = min(best.lengths[-1], self._used(best))
@@ -199,18 +199,46 @@ class _Search:
         ends = layout.x + self.shapes.sizes[index, 0]
         return float(ends[layout.sheets == len(layout.lengths) - 1].max(initial=0.0))
 
-    def _on(self, layout: _Layout) -> tuple:
-        return self.shapes.arrays, self.turns, layout.lengths, self.full[1], layout.arrays
-
     def _apart(self, layout: _Layout, moves: int) -> bool:
         """Push all boards onto their sheets and move them until none overlap; the moves are counted."""
-        if not squeeze(*self._on(layout), self._number()):
+        if not self._squeeze(layout):
             self.moves -= 1
             return False
         weights = np.ones((len(self.areas), len(self.areas)))
-        done, left = separate(*self._on(layout), weights, self._number(), moves)
+        on = self.shapes.arrays, self.turns, layout.lengths, self.full[1], layout.arrays
+        done, left = separate(*on, weights, int(self.rng.integers(1 << 30)), moves)
         self.moves -= max(1, moves - left)
         return bool(done)
 
-    def _number(self) -> int:
-        return int(self.rng.integers(1 << 30))
+    def _squeeze(self, layout: _Layout) -> bool:
+        """Push boards that stand out of their sheets back, or onto others; whether there is a sheet for each."""
+        last = len(layout.lengths) - 1
+        for board, (sheet, turn) in enumerate(zip(layout.sheets, layout.turned, strict=True)):
+            room = self._room(layout, board, turn, min(sheet, last))
+            if sheet <= last and (room >= 0).all():
+                layout.x[board], layout.y[board] = np.clip((layout.x[board], layout.y[board]), 0, room)
+            elif not self._resettle(layout, board, min(sheet, last)):
+                return False
+        return True
+
+    def _resettle(self, layout: _Layout, board: int, nearest: int) -> bool:
+        """Put a board anywhere on any sheet, at any turn, where it fits; the nearest sheet first."""
+        for sheet in (nearest, *self.rng.permutation(len(layout.lengths))):
+            for turn in self.rng.permutation(self.turns):
+                room = self._room(layout, board, turn, sheet)
+                if (room >= 0).all():
+                    layout.sheets[board], layout.turned[board] = sheet, turn
+                    layout.x[board], layout.y[board] = self.rng.random(2) * room
+                    return True
+        return False
+
+    def _room(self, layout: _Layout, board: int, turn: int, sheet: int) -> np.ndarray:
+        """How far a board can be shifted on a sheet, along and across."""
+        return np.array([layout.lengths[sheet], self.full[1]]) - self.shapes.sizes[board * self.turns + turn]
+
+    def _disrupt(self, layout: _Layout) -> None:
+        """Let two large boards change places."""
+        large = np.argsort(-self.areas, kind="stable")[: max(2, len(self.areas) // 3)]
+        pair = self.rng.choice(large, 2, replace=False)
+        for values in (layout.sheets, layout.x, layout.y):
+            values[pair] = values[pair[::-1]]

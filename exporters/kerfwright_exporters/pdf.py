@@ -10,17 +10,22 @@ import numpy as np
 from kerfwright.model import Model
 from kerfwright.model.geometry import sample_loop
 from kerfwright_exporters.cutlist import length_text
-from kerfwright_exporters.dimensions import Dimension, sheet_dimensions
+from kerfwright_exporters.dimensions import LEAST_HEIGHT, Dimension, laid_polygon, sheet_dimensions
+from kerfwright_exporters.drawing import text_room, upright
 from kerfwright_exporters.naming import STAMP, ascii_name, title
 from kerfwright_exporters.options import ExportOptions
 
 if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+    from kerfwright_exporters.drawing import Text
     from kerfwright_exporters.sheets import LaidBoard, Sheet
 
-__all__ = ["sheet_scale", "sheets_pdf"]
+__all__ = ["label_room", "sheet_scale", "sheets_pdf"]
 
 PAGE = (297.0, 210.0)  # A4 across, mm
 BORDER, HEAD = 12.0, 16.0  # mm round the drawing, and for the title above it
+LABEL_HEIGHTS = (3.0, 2.5, 2.1, 1.8, 1.5, 1.2, 1.0, 0.8)  # mm of paper, the largest that fits is taken
 SCALES = (1, 2, 5, 10, 20, 25, 50, 100)
 _COLOURS = {"outside": (0, 0, 0), "inside": (0, 0, 0.8), "bevel": (0.8, 0, 0)}
 
@@ -42,6 +47,8 @@ def sheets_pdf(model: Model, sheets: list[Sheet], options: ExportOptions) -> byt
 
 
 def _page(canvas: Any, model: Model, sheet: Sheet, options: ExportOptions) -> None:
+    import shapely
+
     from kerfwright_exporters.sheets import caption
 
     scale = sheet_scale(sheet)
@@ -57,10 +64,12 @@ def _page(canvas: Any, model: Model, sheet: Sheet, options: ExportOptions) -> No
     canvas.setLineWidth(0.25)
     canvas.setStrokeColorRGB(0.5, 0.5, 0.5)
     canvas.rect(0, 0, sheet.length / scale, sheet.width / scale)
-    for board in sheet.boards:
-        _board(canvas, board, scale, options)
-    for dimension in sheet_dimensions(sheet, scale, options):
+    dimensions = list(sheet_dimensions(sheet, scale, options))
+    for dimension in dimensions:
         _dimension(canvas, dimension, scale)
+    taken = shapely.union_all([dimension.room for dimension in dimensions])
+    for board in sheet.boards:
+        _board(canvas, board, taken, scale, options)
 
 
 def _dimension(canvas: Any, dimension: Dimension, scale: int) -> None:
@@ -78,7 +87,7 @@ def sheet_scale(sheet: Sheet) -> int:
     return next((s for s in SCALES if s >= needed), SCALES[-1])
 
 
-def _board(canvas: Any, board: LaidBoard, scale: int, options: ExportOptions) -> None:
+def _board(canvas: Any, board: LaidBoard, taken: BaseGeometry, scale: int, options: ExportOptions) -> None:
     canvas.setLineWidth(0.2)
     for cut in board.drawing.cuts:
         if cut.operation in _COLOURS:
@@ -89,9 +98,9 @@ def _board(canvas: Any, board: LaidBoard, scale: int, options: ExportOptions) ->
         canvas.line(*(np.array([*bevel.start, *bevel.end]) / scale))
     for text in board.drawing.texts:
         if text.operation == "label":
-            _label(canvas, board, text, scale, options)
+            _label(canvas, board, text, laid_polygon(board).difference(taken), scale, options)
         elif text.operation == "bevel":
-            _text(canvas, text.text, np.array(text.at) / scale, max(1.2, text.height / scale), text.turn)
+            _text(canvas, text.text, np.array(text.at) / scale, max(LEAST_HEIGHT, text.height / scale), text.turn)
 
 
 def _outline(canvas: Any, points: np.ndarray) -> None:
@@ -103,19 +112,26 @@ def _outline(canvas: Any, points: np.ndarray) -> None:
     canvas.drawPath(path)
 
 
-def _label(canvas: Any, board: LaidBoard, text: Any, scale: int, options: ExportOptions) -> None:
-    """Name and size, one above the other, along the board's longer side as it lies."""
-    at = np.array(text.at) / scale
-    size = " x ".join(length_text(v, options) for v in board.size)
-    height = float(np.clip(0.35 * min(board.size) / scale, 1.2, 3.0))
-    length = max(board.size) / scale
-    height = min(height, max(0.8, 1.6 * length / max(len(size), len(_shown(board.name, board.stem)))))
-    turn = text.turn if board.size[0] >= board.size[1] else text.turn + np.pi / 2
-    if np.cos(turn) < -1e-6 or np.sin(turn) < -0.999:  # never upside down
-        turn += np.pi
+def _label(canvas: Any, board: LaidBoard, text: Text, free: BaseGeometry, scale: int, options: ExportOptions) -> None:
+    """Name and size, one above the other, along the board's longer side as it lies, where it is free."""
+    lines = [_shown(board.name, board.stem), " x ".join(length_text(v, options) for v in board.size)]
+    turn = text.turn if board.size[0] >= board.size[1] else upright(text.turn + np.pi / 2)
+    at, height = label_room(free, lines, turn, scale)
     up = np.array([-np.sin(turn), np.cos(turn)])
-    _text(canvas, _shown(board.name, board.stem), at + 0.65 * height * up, height, turn)
-    _text(canvas, size, at - 0.65 * height * up, 0.85 * height, turn)
+    _text(canvas, lines[0], at / scale + 0.65 * height * up, height, turn)
+    _text(canvas, lines[1], at / scale - 0.65 * height * up, 0.85 * height, turn)
+
+
+def label_room(free: BaseGeometry, lines: list[str], turn: float, scale: int) -> tuple[np.ndarray, float]:
+    """Where two turned lines of text fit on a board, mm of the board, and their height, mm of paper."""
+    from reportlab.pdfbase.pdfmetrics import stringWidth
+    from shapely import affinity
+
+    turned = affinity.rotate(free, -turn, origin=(0, 0), use_radians=True)
+    width = 0.5 + max(stringWidth(line, "Helvetica", 1) for line in lines)
+    (x, y), height = text_room(turned, width, 2.6, [scale * h for h in LABEL_HEIGHTS])
+    c, s = np.cos(turn), np.sin(turn)
+    return np.array([c * x - s * y, s * x + c * y]), height / scale
 
 
 def _shown(name: str, otherwise: str) -> str:

@@ -76,10 +76,10 @@ def _middle(centre: np.ndarray, radius: float, start: np.ndarray, end: np.ndarra
 
 def _shortened(edge: Edge, before: Arc | None, after: Arc | None, name: str) -> Edge:
     """The edge from the end of one relief to the start of the next."""
+    if before is None and after is None:  # round holes have no ends
+        return edge
     start = edge.start if before is None else before.end
     end = edge.end if after is None else after.start
-    if before is None and after is None:
-        return edge
     if np.subtract(end, start) @ np.subtract(edge.end, edge.start) <= 0:
         raise ExportError(
             f"board {name!r}: relief: the edge at ({edge.start[0]:.1f}, {edge.start[1]:.1f}) is only "

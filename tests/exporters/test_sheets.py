@@ -17,10 +17,12 @@ from kerfwright.model import Model
 from kerfwright.model.geometry import path_area, sample_loop
 from kerfwright_exporters import ExportOptions
 from kerfwright_exporters.convex import convex_parts
-from kerfwright_exporters.dimensions import sheet_dimensions
+from kerfwright_exporters.dimensions import laid_polygon, sheet_dimensions
+from kerfwright_exporters.drawing import upright
 from kerfwright_exporters.nesting import NestOptions, nest
+from kerfwright_exporters.pdf import label_room
 from kerfwright_exporters.sheets import export, lay_sheets
-from simple import board, hole, polygon, rectangle, stool
+from simple import bevel, board, hole, polygon, rectangle, stool
 
 
 def outlines(count: int, seed: int) -> list[shapely.Polygon]:
@@ -156,6 +158,38 @@ def test_dimension_lines_tell_sizes_and_lie_on_their_boards():
             assert outline.covers(shapely.Point(d.at).buffer(d.height / 2))
 
 
+def test_figures_keep_off_labels_holes_and_the_angles_of_bevels():
+    """A board with a hole in its middle and a bevel at one end: everything that is written on it stands on its own."""
+    slanted = bevel((600, 0), (600, 300), 45.0)
+    window = polygon([(200, 100), (200, 200), (400, 200), (400, 100)])
+    model = Model(boards=(board(rectangle(600, 300), "door", holes=(window,), bevels=(slanted,)),))
+    (sheet,) = lay_sheets(model, ExportOptions())
+    (laid,) = sheet.boards
+    figures = [d for d in sheet_dimensions(sheet, 10.0, ExportOptions()) if d.text in ("600.0 mm", "300.0 mm")]
+    texts = [text_box(*f) for f in [(t.text, t.at, t.height, t.turn) for t in (*laid.drawing.texts, *figures)]]
+    assert len(figures) == 2 and len(texts) == 4
+    assert all(laid_polygon(laid).covers(text) for text in texts)
+    assert not any(a.intersects(b) for a, b in combinations(texts, 2))
+
+
+def text_box(text: str, at: tuple[float, float], height: float, turn: float) -> shapely.Polygon:
+    """The room of a line of text in a common font, centred."""
+    half = np.array([0.6 * len(text), 1.0]) * height / 2
+    return affinity.rotate(shapely.box(*(at - half), *(at + half)), turn, use_radians=True)
+
+
+@pytest.mark.parametrize("turn", [0.0, np.pi / 2])
+def test_labels_of_the_pdf_stand_beside_holes(turn):
+    frame = shapely.box(0, 0, 400, 500) - shapely.box(60, 60, 340, 440)
+    at, height = label_room(frame, ["frame", "500.0 mm x 400.0 mm"], turn, 10)
+    assert height >= 1.2 and frame.covers(text_box("500.0 mm x 400.0 mm", at, 10 * height, turn))
+
+
+@pytest.mark.parametrize(("turn", "reads"), [(0, 0), (90, 90), (180, 0), (270, 90), (-45, -45), (135, -45)])
+def test_text_is_never_upside_down(turn, reads):
+    assert np.degrees(upright(np.radians(turn))) == pytest.approx(reads)
+
+
 def test_dimensions_are_in_all_three_drawings(tmp_path):
     paths = {p.suffix: p for p in export(stool(), tmp_path, ExportOptions(units="in"))}
     texts = [t.dxf.text for t in ezdxf.readfile(paths[".dxf"]).modelspace().query('TEXT[layer=="DIMENSION"]')]
@@ -169,10 +203,8 @@ def test_same_bytes_twice(tmp_path):
 
 
 def test_an_outline_that_crosses_itself_by_a_hair_is_measured_all_the_same():
-    from kerfwright_exporters.dimensions import _polygon
-
     hair = [(0, 0), (50, 0), (50.02, -0.01), (50.01, 0.02), (49.99, -0.02), (100, 0), (100, 60), (0, 60)]
     cut = SimpleNamespace(operation="outside", loop=polygon(hair))
     assert not shapely.Polygon(hair).is_valid
-    whole = _polygon(SimpleNamespace(drawing=SimpleNamespace(cuts=[cut])))
+    whole = laid_polygon(SimpleNamespace(drawing=SimpleNamespace(cuts=[cut])))
     assert whole.is_valid and whole.area == pytest.approx(6000, rel=1e-3)

@@ -98,6 +98,11 @@ def test_edges_too_short_for_their_reliefs_are_refused():
         relieved_path(CutPath(outer=FORK), "dogbone", 16.0, "board")
 
 
+def test_round_holes_need_no_relief():
+    path = board(FORK, holes=(hole(20, 20, 6),)).cut_path
+    assert relieved_path(path, "dogbone", 6.0, "fork").holes == path.holes
+
+
 def test_round_corners_need_no_relief():
     assert relieved_path(CutPath(outer=WAVY), "dogbone", 6.0, "board").outer == WAVY
 

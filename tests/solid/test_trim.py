@@ -7,7 +7,7 @@ import pytest
 
 from kerfwright.model import Bezier, Contact, Line, Loop, Model
 from kerfwright.model.clip import ConvexArea, clipped_loop
-from kerfwright.model.frames import rows
+from kerfwright.model.frames import invert, model_from_board, rows
 from kerfwright.model.geometry import edge_length, edge_points, loop_distance, reverse_edge, signed_area
 from kerfwright.model.pieces import edge_piece
 from kerfwright.model.slits import without_slits
@@ -55,6 +55,22 @@ def test_an_edge_that_crosses_the_sheet_is_moved_and_not_bent():
     assert overlap(model) > 1 and overlap(trimmed) == pytest.approx(0, abs=1e-6)
     assert len(trimmed.boards[1].cut_path.outer.edges) == 4
     assert trimmed.boards[1].cut_path.outer.edges[1].end == pytest.approx((379.994, 300), abs=1e-6)
+
+
+def test_a_repeat_is_turned_in_its_own_plane_onto_the_sheet_that_it_ends_on():
+    """The second leg stands askew by 1e-4 rad: its end is .03 mm off the top at one side, and on it at the other."""
+    model = longer_legs(0)
+    top, left, right = model.boards
+    c, s = np.cos(1e-4), np.sin(1e-4)
+    askew = model_from_board(right) @ [[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+    right = right.model_copy(update={"model_from_board": rows(askew)})
+    model = model.model_copy(update={"boards": (top, left, right)})
+    trimmed = fitted_together(model)
+    assert {f.code for f in check(model)} >= {"K201"}
+    assert not [f for f in check(trimmed) if f.code in ("K201", "K202", "K210")]
+    assert trimmed.boards[:2] == model.boards[:2] and trimmed.boards[2].cut_path == model.boards[1].cut_path
+    moved = invert(askew) @ model_from_board(trimmed.boards[2])
+    assert moved[2] == pytest.approx([0, 0, 1, 0], abs=1e-12)  # its sheet planes stay where they were
 
 
 def test_a_mirror_image_is_trimmed_in_the_mirror():

@@ -1,6 +1,7 @@
 """Generated build123d programs, run with changed dimensions, and what holds of the result."""
 
 import re
+from functools import cache
 from itertools import combinations
 
 import numpy as np
@@ -56,9 +57,14 @@ def interference(solids: dict) -> float:
     return sum(common_volume(a, b) for a, b in combinations(shapes, 2) if penetration(a, b) > 1e-3)
 
 
+@cache
+def contacts_as_written(source: str) -> dict:
+    return typed_contacts(*run(source))
+
+
 def problems(source: str, **changes: float) -> list[str]:
     """What is wrong after the change, compared with the program as it was written."""
-    before = typed_contacts(*run(source))
+    before = contacts_as_written(source)
     try:
         solids, normals = run(source, **changes)
         after = typed_contacts(solids, normals)  # fails on a solid that lost its faces

@@ -2,7 +2,8 @@
 
 Fits leave slits where an outline doubles back on itself, and outlines hundredths of a millimetre inside the boards
 beside them. Where a board ends on another's sheet, the whole edge is put on that sheet; elsewhere only what lies in the
-neighbour goes. Deeper overlaps are no slip of a fit and are left for the checker to report.
+neighbour goes. A board that ends on one sheet only is then moved onto it, within its own plane. Deeper overlaps are no
+slip of a fit and are left for the checker to report.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from kerfwright.errors import ModelError
 from kerfwright.model import Board, Contact, CutPath, Line, Loop, Model
 from kerfwright.model.clip import ConvexArea, clipped_loop
-from kerfwright.model.frames import board_from_model, model_from_board, transform_points
+from kerfwright.model.frames import board_from_model, model_from_board, rows, transform_points
 from kerfwright.model.geometry import edge_points, sample_loop, transform_path
 from kerfwright.model.slits import without_slits
 from kerfwright.solid.build import board_solid, location
@@ -75,6 +76,9 @@ def fitted_together(model: Model, options: TrimOptions | None = None) -> Model:
                 break
             boards |= trimmed
             shapes |= dict(_shapes(trimmed.values()))
+    seated = dict(_seated(boards, shapes, model.contacts, options))
+    boards |= seated
+    shapes |= dict(_shapes(seated.values()))
     model = model.model_copy(update={"boards": tuple(boards[board.name] for board in model.boards)})
     return model.model_copy(update={"contacts": tuple(_measured(c, options, shapes) for c in model.contacts)})
 
@@ -147,6 +151,54 @@ def _trimmed(
     return None
 
 
+def _seated(
+    boards: dict[str, Board], shapes: dict[str, Shape], contacts: tuple[Contact, ...], options: TrimOptions
+) -> Iterator[tuple[str, Board]]:
+    """Boards that end on one other only, turned and moved within their sheet planes by a hair so that they lie on it.
+
+    Repeats have one outline, and turns that are not quite the same: cut to fit one of them, it leaves a gap at another.
+    """
+    ending = [contact for contact in contacts if contact.type in ENDING]
+    for contact in ending:
+        if sum(c.b == contact.b for c in ending) > 1 or not {contact.a, contact.b} <= shapes.keys():
+            continue
+        board = boards[contact.b]
+        for normal, offset in _sheet_lines(board, shapes[contact.a], contact, options):
+            edges = list(_edges_along(board, normal, offset, options.end))
+            if len(edges) == 1 and np.abs(edges[0] @ normal - offset).max() > options.touch:
+                pose = model_from_board(board) @ _motion_onto(edges[0], normal, offset)
+                yield board.name, board.model_copy(update={"model_from_board": rows(pose)})
+
+
+def _edges_along(board: Board, normal: np.ndarray, offset: float, within: float) -> Iterator[np.ndarray]:
+    """Ends (2, 2) of the straight edges that all but lie on a line."""
+    for edge in board.cut_path.outer.edges:
+        if isinstance(edge, Line):
+            ends = np.array([edge.start, edge.end])
+            if np.abs(ends @ normal - offset).max() <= within:
+                yield ends
+
+
+def _motion_onto(edge: np.ndarray, normal: np.ndarray, offset: float) -> np.ndarray:
+    """The motion (4, 4) in the board's plane about the middle of an edge that lays it on a line, the board inside."""
+    (x, y), middle = edge[1] - edge[0], edge.mean(axis=0)
+    turn = np.arctan2(-normal[0] * x - normal[1] * y, normal[1] * x - normal[0] * y)
+    c, s = np.cos(turn), np.sin(turn)
+    motion = np.eye(4)
+    motion[:2, :2] = [[c, -s], [s, c]]
+    motion[:2, 3] = middle + (offset - normal @ middle) * normal - motion[:2, :2] @ middle
+    return motion
+
+
+def _sheet_lines(
+    board: Board, other: Shape, contact: Contact, options: TrimOptions
+) -> Iterator[tuple[np.ndarray, float]]:
+    """The faces of the other board on which this one ends, as lines in its own plane."""
+    for face in other.faces:
+        if face.normal @ np.array(contact.normal) > np.cos(np.radians(options.tilt)) and (line := _line(board, face)):
+            yield line
+
+
 def _with_outline(board: Board, loop: Loop) -> Board:
     return board.model_copy(update={"cut_path": board.cut_path.model_copy(update={"outer": loop})})
 
@@ -178,11 +230,10 @@ def _areas(
 ) -> Iterator[ConvexArea]:
     """What to take off the board: all beyond the sheet that it ends on, or only what lies in the other."""
     if contact is not None and contact.type in ENDING:
-        normal, outline = np.array(contact.normal), sample_loop(board.cut_path.outer)
-        for face in other.faces:
-            if face.normal @ normal > np.cos(np.radians(options.tilt)) and (line := _line(board, face)):
-                for end in _ends(board, *line, options):
-                    yield from _area(board, [end], outline, options.end, options)
+        outline = sample_loop(board.cut_path.outer)
+        for line in _sheet_lines(board, other, contact, options):
+            for end in _ends(board, *line, options):
+                yield from _area(board, [end], outline, options.end, options)
     for piece in shared:
         faces = [face for face in other.faces if any(_same_plane(face, own, options.touch) for own in piece.faces)]
         clear = 0.0 if contact is not None else options.clear
@@ -190,9 +241,7 @@ def _areas(
         yield from _area(board, lines, _flat(board, piece.points), options.deepest + clear, options)
 
 
-def _ends(
-    board: Board, normal: np.ndarray, offset: float, options: TrimOptions
-) -> Iterator[tuple[np.ndarray, float]]:
+def _ends(board: Board, normal: np.ndarray, offset: float, options: TrimOptions) -> Iterator[tuple[np.ndarray, float]]:
     """New lines for the straight edges that a line runs along: it, or where it crosses the edge, one along the edge."""
     for edge in board.cut_path.outer.edges:
         if not isinstance(edge, Line):
