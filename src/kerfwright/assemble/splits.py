@@ -28,6 +28,7 @@ LEAST_STRENGTH = 7.0  # of a board's best seam, against the usual change across 
 LENT_STRENGTH = 4.0  # of further ones: where two boards were glued, more may have been
 LEAST_ALONG = 0.5  # share of the change that every third of the line must show
 LEAST_VIEWS = 4
+CERTAIN = 2.0  # times LEAST_STRENGTH; steep grain that passed for a seam in four views had up to 1.13
 DENIED = 2.0  # strength at a seam's place on the other face, below which there is none
 THROUGH = 1 / 150  # of D, between a seam's places on both faces
 LEAST_AGREEMENT = 0.75  # mean share of the change that a single view shows
@@ -100,8 +101,12 @@ def _seams_across(
         if all(abs(s.offset - other) > KNOWN * diameter for other in known)
         and _crosses_all(sheet.region, m, s.offset, margin / 4)
     ]
-    best = max((s.strength for s in seams), default=0.0)
-    return seams if best > LEAST_STRENGTH else []
+    return seams if any(_is_clear(s) for s in seams) else []
+
+
+def _is_clear(seam: SeamLine) -> bool:
+    """Whether a seam counts by itself: one that just passes must show in more than the least views."""
+    return seam.strength > LEAST_STRENGTH and (seam.views > LEAST_VIEWS or seam.strength > CERTAIN * LEAST_STRENGTH)
 
 
 def _seam_places(change: Discontinuity, across: np.ndarray, margin: float) -> list[int]:

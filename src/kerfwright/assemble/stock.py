@@ -15,6 +15,8 @@ from kerfwright.model import Origin, Quantity
 
 __all__ = ["share_thickness", "with_thickness"]
 
+GUESSED = 0.1  # relative difference between a guessed thickness and the stock that it was taken from, as then measured
+
 
 def share_thickness(sheets: tuple[Sheet, ...], diameter: float, options: AssembleOptions) -> tuple[Sheet, ...]:
     """Sheets whose thicknesses agree within their uncertainty get their robust mean; unseen ones take their twins',
@@ -42,10 +44,13 @@ def share_thickness(sheets: tuple[Sheet, ...], diameter: float, options: Assembl
 
 
 def _unseen(told: Quantity, means: np.ndarray, common: float) -> Quantity:
-    """The thickness of the stock that a board's twin is of; without a twin, of what most wood is."""
-    if told.origin is not Origin.SHARED:
-        return Quantity(value=common, standard_error=0.3 * common, origin=Origin.INFERRED)
+    """The thickness of the stock that a board's twin is of; without a twin, of the one that it was guessed to be of, or
+    else of what most wood is.
+    """
     nearest = float(means[np.argmin(np.abs(means - told.value))])
+    if told.origin is not Origin.SHARED:
+        value = nearest if abs(nearest - told.value) < GUESSED * told.value else common
+        return Quantity(value=value, standard_error=0.3 * value, origin=Origin.INFERRED)
     return Quantity(value=nearest, standard_error=told.standard_error, origin=Origin.SHARED)
 
 
