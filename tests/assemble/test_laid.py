@@ -98,3 +98,10 @@ def test_slats_on_two_rails_are_made_flush():
     assert [s.world_from_board[2, 3] for s in moved[:3]] == pytest.approx([410.1] * 3)
     assert [s.thickness.value for s in moved[3:]] == pytest.approx([30.1] * 2)
     assert len(laid_contacts(moved, 7.0)) == 6
+
+
+def test_two_finds_of_one_board_are_not_laid_on_each_other():
+    sheets, cloud = stool(22.0)
+    again = sheet("again", pose((0, 0, 381)), 22, (-30, -140, 30, 0), quantity=sheets[1].thickness)
+    assert all(s.thickness.value > 0 for s in laid_on((sheets[1], again), cloud, BLIND, OPTIONS))
+    assert not laid_contacts(laid_on((sheets[1], again), cloud, BLIND, OPTIONS), 7.0)

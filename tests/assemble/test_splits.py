@@ -5,7 +5,17 @@ import pytest
 from shapely.geometry import box
 
 from clouds import sheet
-from kerfwright.assemble.splits import SeamLine, _crosses_all, _partner, seam_contact, seam_segments, split_sheet
+from kerfwright.assemble.discontinuity import Discontinuity
+from kerfwright.assemble.splits import (
+    SeamLine,
+    _crosses_all,
+    _is_clear,
+    _is_denied,
+    _partner,
+    seam_contact,
+    seam_segments,
+    split_sheet,
+)
 
 ACROSS = np.array([1.0, 0.0])
 WIDE = sheet("wide", np.eye(4), 20.0, (0, 0, 300, 100), top_idx=np.arange(6))
@@ -56,3 +66,25 @@ def test_two_lines_side_by_side_are_one_joint():
     strength[[20, 28, 50]] = 10, 9, 9.5
     assert _partner(strength, 20, 12) == 8
     assert _partner(strength, 50, 12) == 0
+
+
+def changing(strength: float, views: int, at: float = 100.0) -> Discontinuity:
+    """A face of which `views` photographs show some change at one place, and the usual one elsewhere."""
+    offsets = np.arange(0.0, 300.0)
+    values = np.where(np.abs(offsets - at) < 2, strength, 1.0)
+    none = np.zeros((300, 8, 1))
+    return Discontinuity(offsets, values, none[:, 0], none, np.zeros((views, *none.shape)))
+
+
+@pytest.mark.parametrize(("other", "denied"), [
+    (changing(1.2, 6), True), (changing(1.2, 3), False), (changing(5.0, 6), False), (changing(5.0, 6, at=150), True),
+    (None, False),
+])  # fmt: skip
+def test_a_seam_goes_through_to_the_other_face(other, denied):
+    assert _is_denied(seam(100), changing(8.0, 5), other, 500.0) is denied
+
+
+@pytest.mark.parametrize(("strength", "views", "clear"), [(8, 4, False), (8, 5, True), (15, 4, True), (6, 8, False)])
+def test_few_views_need_a_stronger_seam(strength, views, clear):
+    line = SeamLine(ACROSS, 100.0, np.zeros(2), np.array([0.0, 100.0]), strength, views)
+    assert _is_clear(line) is clear

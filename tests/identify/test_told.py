@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from shapely.geometry import box
 
-from clouds import pose
+from clouds import cloud_only, pose
+from kerfwright.capture.types import Cloud
 from kerfwright.identify import IdentifyOptions, told
 from kerfwright.identify.rims import Rim
 from kerfwright.identify.thickness import ThicknessHypothesis
@@ -12,7 +13,7 @@ from kerfwright.identify.told import Known, told_by_others
 
 NO_RIM = Rim(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, int), np.zeros(0, bool), np.zeros(0))
 SCENE = SimpleNamespace(
-    photos=None, free=None, options=IdentifyOptions(), diameter=500.0, thickness_limits=(2.0, 80.0),
+    capture=cloud_only(Cloud(np.zeros((0, 3)), np.zeros((0, 3)))), around=None, photos=None, free=None, options=IdentifyOptions(), diameter=500.0, thickness_limits=(2.0, 80.0),
     is_broad=lambda piece: True,
 )
 
@@ -30,6 +31,7 @@ def faint(monkeypatch):
     """What the photographs show faintly, by the region's place."""
     shown: dict[float, list[ThicknessHypothesis]] = {}
     monkeypatch.setattr(told, "from_photos", lambda frame, *_, **__: shown.get(float(frame[0, 3]), []))
+    monkeypatch.setattr(told, "from_cut_faces", lambda *_: [])
     return shown
 
 
@@ -73,3 +75,12 @@ def test_twins_that_disagree_tell_nothing(faint):
 def test_what_only_a_guess_gave_makes_no_twin(faint):
     ground = region(400, 200, edge(40.0, evidence="ground"), at=50.0)
     assert told_by_others([region(400, 200), ground], SCENE)[0].best is None
+
+
+def test_cut_faces_in_the_cloud_say_more_than_a_guess(faint, monkeypatch):
+    depths = [edge(11.0, 0.06, "cut"), edge(13.0, 0.1, "cut"), edge(60.0, 0.3, "cut")]
+    monkeypatch.setattr(told, "from_cut_faces", lambda *_: depths)
+    known, other = told_by_others([region(400, 200), region(300, 100, edge(18.0), at=100.0)], SCENE)
+    assert (known.best.value, known.best.evidence, known.told) == (13.0, "cut", True), "60 is another board's"
+    assert known.best.standard_error > 1.5
+    assert other.best.value == 18.0

@@ -82,11 +82,11 @@ def find_contacts(
     """Every pair of boards that meets cut on sheet, with corners decided.
 
     earlier : what was found before the regions were run on; its corners stay as they are, for they were decided when
-        less was known that could hide their seams.
+        less was known that could hide their seams, and a board that was run on to another still ends there.
     """
     settled = {frozenset((d.joint.a, d.joint.b)): d for d in earlier if d.kind in (2, 4)}
     scene = _Scene(sheets, cloud, photos, Obstacles(sheets, options.outline_error * cloud.diameter), free, options)
-    near, far, doubtful = _all_joints(scene)
+    near, far, doubtful = _all_joints(scene, {(d.joint.a, d.joint.b) for d in earlier if d.kind == 1})
     found: list[Decided] = []
     for a in range(len(sheets)):
         for b in range(a + 1, len(sheets)):
@@ -114,8 +114,10 @@ def _with_flush_end(scene: _Scene, d: Decided) -> Decided:
 _Joints = dict[tuple[int, int], Joint]
 
 
-def _all_joints(scene: _Scene) -> tuple[_Joints, _Joints, _Joints]:
-    """Joints by (a, b): near ones, those further apart, and those where a's wood is not seen but may be."""
+def _all_joints(scene: _Scene, known: set[tuple[int, int]]) -> tuple[_Joints, _Joints, _Joints]:
+    """Joints by (a, b): near ones, those further apart, and those where a's wood is not seen but may be. Those `known`
+    are not asked for a seam again.
+    """
     near, far, doubtful = {}, {}, {}
     pairs = [(a, b) for a in range(len(scene.sheets)) for b in range(len(scene.sheets)) if a != b]
     for a, b in pairs:
@@ -128,7 +130,10 @@ def _all_joints(scene: _Scene) -> tuple[_Joints, _Joints, _Joints]:
             far[a, b] = joint
         else:
             near[a, b] = joint
-    near = {key: j for key, j in near.items() if _is_contact(scene, j, near.get(key[::-1]) or far.get(key[::-1]))}
+    near = {
+        key: j for key, j in near.items()
+        if key in known or _is_contact(scene, j, near.get(key[::-1]) or far.get(key[::-1]))
+    }
     return near, far, doubtful
 
 

@@ -20,7 +20,7 @@ from kerfwright.capture.types import Cloud
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.types import Sheet
 
-__all__ = ["is_seen", "is_thin", "mended", "usual_density"]
+__all__ = ["is_seen", "is_thin", "mended", "places_in", "usual_density"]
 
 LINED = 0.15  # of a gap's outline; beyond, cut faces show that it is real
 SEEN = 0.3  # of a gap's area; beyond, it was seen through
@@ -93,12 +93,17 @@ def is_thin(gap: Polygon, region: Polygon, face: np.ndarray, near: float, dense:
 
 def is_seen(gap: Polygon, sheet: Sheet, free: FreeSpace) -> bool:
     """Whether cameras saw through the gap."""
-    low_x, low_y, high_x, high_y = gap.bounds
-    step = max(np.sqrt(gap.area / SAMPLES), 0.5)
-    x, y = np.meshgrid(np.arange(low_x + step / 2, high_x, step), np.arange(low_y + step / 2, high_y, step))
-    inside = shapely.contains_xy(gap, x.ravel(), y.ravel())
-    xy = np.stack([x.ravel(), y.ravel()], axis=1)[inside]
+    xy = places_in(gap)
     if not len(xy):
         return False
     places = sheet.to_world(np.c_[xy, np.full(len(xy), sheet.thickness.value / 2)])
     return float((free.votes(places) >= 2).mean()) > SEEN
+
+
+def places_in(gap: Polygon) -> np.ndarray:
+    """(N, 2) some places spread over a gap."""
+    low_x, low_y, high_x, high_y = gap.bounds
+    step = max(np.sqrt(gap.area / SAMPLES), 0.5)
+    x, y = np.meshgrid(np.arange(low_x + step / 2, high_x, step), np.arange(low_y + step / 2, high_y, step))
+    inside = shapely.contains_xy(gap, x.ravel(), y.ravel())
+    return np.stack([x.ravel(), y.ravel()], axis=1)[inside]

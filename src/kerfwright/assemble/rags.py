@@ -15,7 +15,7 @@ import shapely
 from scipy.spatial import cKDTree
 from shapely.geometry import Polygon
 
-from kerfwright.assemble.gaps import is_seen, is_thin, usual_density
+from kerfwright.assemble.gaps import is_seen, is_thin, places_in, usual_density
 from kerfwright.assemble.laid import moved_region
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.assemble.outlines import largest_piece
@@ -131,8 +131,9 @@ def _is_lined(gap: Polygon, both: Polygon, cut: np.ndarray, near: float) -> bool
 
 def _runs_through(sheet: Sheet, piece: Sheet, gap: Polygon) -> bool:
     """Whether another board fills part of a gap, half way through the piece."""
-    places = shapely.get_coordinates(shapely.segmentize(gap.buffer(-0.5), 2.0))
-    inner = np.concatenate([places, [gap.representative_point().coords[0]]])
+    inner = places_in(gap)
+    if not len(inner):
+        return False
     x = sheet.to_board(piece.to_world(np.c_[inner, np.full(len(inner), piece.thickness.value / 2)]))
     inside = (x[:, 2] > 0) & (x[:, 2] < sheet.thickness.value) & shapely.contains_xy(sheet.region, x[:, 0], x[:, 1])
     return float(inside.mean()) > THROUGH

@@ -55,9 +55,7 @@ class View:
         """
         import cv2
 
-        pixels = cv2.imread(str(self.path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
-        if pixels is None:
-            raise CaptureError(f"{self.path}: image: cannot be read: check that the file is a whole JPEG, PNG or TIFF")
+        pixels = self._as_on_disk()
         width, height = self.camera.width, self.camera.height
         if (pixels.shape[1] // self.shrink, pixels.shape[0] // self.shrink) != (width, height):
             raise CaptureError(
@@ -67,6 +65,14 @@ class View:
         if self.shrink > 1:
             whole = pixels[: height * self.shrink, : width * self.shrink]
             pixels = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
+        return pixels
+
+    def _as_on_disk(self) -> np.ndarray:
+        import cv2
+
+        pixels = cv2.imread(str(self.path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+        if pixels is None:
+            raise CaptureError(f"{self.path}: image: cannot be read: check that the file is a whole JPEG, PNG or TIFF")
         return cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB)
 
 

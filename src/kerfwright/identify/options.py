@@ -33,7 +33,7 @@ class IdentifyOptions:
     cut_area_ratio: float = 5.0  # paper, Part Selection: cut surface over cut region area
     sample_voxel: float = 1 / 150  # spacing of the surface samples that selection covers
     board_cost: float = 0.006  # a board must explain this share of the surface to be worth having
-    dark_density: float = 0.1  # points on a dark board's faces at most, of those on faces seen well
+    dark_density: float = 0.35  # points on a dark board's faces at most, of those on faces seen well
     free_sites: int = 1500  # interior samples of a candidate tested for see-through
     max_free: float = 0.25  # candidates with a larger share of see-through interior are dropped
     least_explained: float = 0.7  # share of the surface; stereo's fringe leaves a good model with .8 or more

@@ -104,9 +104,8 @@ def _faint(known: Known, scene: _Scene) -> list[ThicknessHypothesis]:
 
 def _by_cut_faces(known: Known, scene: _Scene) -> ThicknessHypothesis | None:
     """Where the cloud's points on the cut faces end: rough, for stereo blurs both edges, but seen."""
-    found = from_cut_faces(
-        known.frame, known.piece, scene.capture.cloud, scene.around, (scene.thickness_limits[0], THICK * scene.diameter)
-    )
+    found = from_cut_faces(known.frame, known.piece, scene.capture.cloud, scene.around, scene.thickness_limits)
+    found = [h for h in found if h.value < THICK * scene.diameter]
     if not found:
         return None
     best = max(found, key=lambda h: h.support)

@@ -30,8 +30,7 @@ class MemoryView(View):
 
     pixels: np.ndarray = None
 
-    def image(self) -> np.ndarray:
-        """A copy of the photograph, (height, width, 3) uint8 RGB."""
+    def _as_on_disk(self) -> np.ndarray:
         return self.pixels.copy()
 
 
@@ -113,7 +112,7 @@ def in_memory(assembly: Model, options: CaptureOptions, photographed: bool = Tru
     if not photographed:
         return Capture(assembly.name, (), session.cloud(), Scale(millimetres_per_unit=1.0, origin="given"))
     views = tuple(
-        MemoryView(f"IMG_{k:04d}.jpg", Path(f"IMG_{k:04d}.jpg"), session.camera, pose, picture)
+        MemoryView(f"IMG_{k:04d}.jpg", Path(f"IMG_{k:04d}.jpg"), session.camera, pose, pixels=picture)
         for k, (pose, picture) in enumerate(zip(session.poses, session.photographs(), strict=True))
     )
     return Capture(assembly.name, views, session.cloud(), Scale(millimetres_per_unit=1.0, origin="given"))

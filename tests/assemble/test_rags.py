@@ -1,0 +1,70 @@
+"""Pieces of one board that the cloud shows apart are joined, and only those."""
+
+import numpy as np
+import pytest
+
+from clouds import pose, sheet
+from kerfwright.assemble import AssembleOptions
+from kerfwright.assemble.rags import pieced_together
+from kerfwright.capture.types import Cloud
+from kerfwright.identify.freespace import FreeSpace
+
+BLIND = FreeSpace((), (), 1.0, 1.0)
+OPTIONS = AssembleOptions()
+LEVEL = pose((0, 0, 200))
+
+
+class Everywhere(FreeSpace):
+    """Cameras that saw through every place."""
+
+    def votes(self, x_in_world):
+        return np.full(len(x_in_world), 3)
+
+
+def face(x0, x1, step):
+    """Points on the top of a board at z = 210 between x0 and x1."""
+    grid = np.stack(np.meshgrid(np.arange(x0, x1, step), np.arange(1, 100, step)), axis=-1).reshape(-1, 2)
+    return np.c_[grid, np.full(len(grid), 210.0)]
+
+
+def shelf(gap=20.0, step=12.0, lift=0.0, thickness=10.0, lined=False):
+    """Two pieces with a gap between them, seen badly, and a table top that was seen well."""
+    points = [face(0, 150, step), face(150 + gap, 300, step), np.c_[face(0, 500, 4)[:, :2], np.full(125 * 25, 400.0)]]
+    rim = np.array([[x, y, 205.0] for x in (150.0, 150 + gap) for y in np.arange(0, 100, 2.0)]) if lined else np.zeros((0, 3))
+    cloud = Cloud(np.concatenate([*points, rim]), np.tile([0, 0, 1.0], (sum(map(len, points)) + len(rim), 1)))
+    ends = np.cumsum([0, *map(len, points), len(rim)])
+    idx = [np.arange(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    cut = {"cut_idx": idx[3]}
+    one = sheet("one", LEVEL, 10.0, (0, 0, 150, 100), top_idx=idx[0], **cut)
+    two = sheet("two", pose((0, 0, 200 + lift)), thickness, (150 + gap, 0, 300, 100), top_idx=idx[1], **cut)
+    top = sheet("top", pose((0, 0, 390)), 10.0, (0, 0, 500, 100), top_idx=idx[2])
+    return (one, two, top), cloud
+
+
+def joined(sheets, cloud, free=BLIND):
+    return pieced_together(sheets, cloud, free, OPTIONS)
+
+
+def test_rags_of_a_dark_shelf_are_one_board():
+    whole, top = joined(*shelf())
+    assert (whole.name, top.name) == ("one", "top")
+    assert whole.region.area == pytest.approx(300 * 100, rel=0.01)
+    assert len(whole.top_idx) == sum(len(s.top_idx) for s in shelf()[0][:2])
+
+
+@pytest.mark.parametrize("apart", [
+    {"step": 4.0}, {"lift": 5.0}, {"thickness": 16.0}, {"lined": True}, {"gap": 120.0},
+])  # fmt: skip
+def test_boards_apart_stay_apart(apart):
+    assert len(joined(*shelf(**apart))) == 3
+
+
+def test_a_gap_that_was_seen_through_stays():
+    sheets, cloud = shelf()
+    assert len(joined(sheets, cloud, Everywhere((), (), 1.0, 1.0))) == 3
+
+
+def test_a_board_that_runs_through_parts_them():
+    sheets, cloud = shelf()
+    through = sheet("through", pose((152, 0, 100), (0, 1, 0), (0, 0, 1)), 16.0, (0, 0, 100, 200))
+    assert len(joined((*sheets, through), cloud)) == 4
