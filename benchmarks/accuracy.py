@@ -39,11 +39,17 @@ def row_of(capture: Path, out: Path, run: Run, stage: str | None) -> dict[str, A
     """The figures of one capture that the board shows; `error` where there are none."""
     row: dict[str, Any] = {"run": asdict(run), "images": len(list((capture / "images").iterdir()))}
     if stage not in ("identify", "assemble") and not (out / "model.json").exists():
-        return row | {"error": run.last_line or f"exit code {run.code}"}
+        return row | {"error": run.last_line or f"exit code {run.code}", "missed": true_counts(capture)}
     try:
         return row | {"score": evaluate(out, capture / "truth", stage)}
     except KerfwrightError as error:
-        return row | {"error": str(error)}
+        return row | {"error": str(error), "missed": true_counts(capture)}
+
+
+def true_counts(capture: Path) -> dict[str, int]:
+    """What a capture without a result leaves unfound: it counts in the shares of the whole set."""
+    truth = json.loads((capture / "truth" / "truth.json").read_text())
+    return {"parts_true": len(truth["parts"]), "contacts_true": len(truth["connections"])}
 
 
 def worst(score: dict[str, Any], key: str) -> float | None:
@@ -116,7 +122,7 @@ def cells(name: str, row: dict[str, Any], before: dict[str, Any], known: dict[st
 
 def sums(rows: dict[str, dict[str, Any]]) -> str:
     """What the set as a whole gets."""
-    scores = [r["score"] for r in rows.values() if r.get("score")]
+    scores = [r.get("score") or r.get("missed", {}) for r in rows.values()]
     lines = [f"{sum(map(is_right, rows.values()))} of {len(rows)} captures right in every board and contact."]
     for what, right, whole in (
         ("boards", "parts_matched", "parts_true"),

@@ -71,6 +71,13 @@ def test_a_failed_run_is_a_row_and_not_a_crash(bench):
     assert "stool, paper" in page
 
 
+def test_boards_of_a_failed_run_count_as_not_found(bench):
+    accuracy = bench("accuracy")
+    lost = {"error": "x", "missed": {"parts_true": 3, "contacts_true": 2}, "run": score()["run"], "images": 5}
+    page = accuracy.board({"good": score(), "lost": lost}, {}, {})
+    assert "50.0 % of 6 boards. 50.0 % of 4 typed contacts." in page
+
+
 def test_growth_is_the_exponent_of_size(bench):
     speed = bench("speed")
     sizes = (10, 100, 1000)

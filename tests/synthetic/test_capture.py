@@ -198,3 +198,26 @@ def test_windows_light_what_faces_them_and_blinds_cast_edges():
     striped = irradiance(scene, replace(light, bars=60.0), x, np.tile([0, 0, 1.0], (80, 1)), 24, rng)[:, 0]
     assert striped.max() - striped.min() > 0.1
     assert (np.abs(np.diff(striped)) > 0.1).sum() >= 2
+
+
+@pytest.mark.parametrize("samples", [1, 2])
+def test_a_pixel_is_the_mean_colour_of_what_its_rays_meet(samples):
+    """The compiled picture against the stage's own colours, ray by ray; matt wood."""
+    from kerfwright.synthetic.render import _fill
+    from kerfwright.synthetic.stage import build_stage
+
+    options = ImageOptions(samples=samples, texels=0.01, floor_texels=256, room_nodes=8, light_rays=6, gloss=0.0)
+    stage = build_stage(tiny_assembly(), options, np.random.default_rng(0))
+    camera, pose = (
+        Camera("PINHOLE", 40, 30, (40.0, 40.0, 20.0, 15.0)),
+        looking_at(np.array([500.0, -400, 350]), np.zeros(3)),
+    )
+    rays, out = camera_rays(camera, samples), np.empty((30, 40, 3), np.float32)
+    _fill(out, stage, rays, pose)
+    eye, toward = -pose[:3, :3].T @ pose[:3, 3], rays.reshape(-1, 3) @ pose[:3, :3].astype(np.float32)
+    hits = stage.scene.cast(eye, toward)
+    assert np.isfinite(hits.distance).all()
+    single = stage.colour(eye + hits.distance[:, None] * toward, hits.triangle)
+    mean = single.reshape(30, samples, 40, samples, 3).mean(axis=(1, 3))
+    assert np.abs(out - mean).mean() < 1e-3
+    assert (stage.owner[hits.triangle] >= 0).any()

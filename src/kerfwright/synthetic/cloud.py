@@ -73,14 +73,10 @@ def _pixels(
     toward = rays @ pose[:3, :3].astype(np.float32)
     eye = -pose[:3, :3].T @ pose[:3, 3]
     hits = stage.scene.cast(eye, toward)
-    wanted = stage.owner[np.where(np.isfinite(hits.distance), hits.triangle, 0)] >= 0
-    floor = (
-        np.isfinite(hits.distance)
-        & ~wanted
-        & options.floor
-        & (stage.normals[hits.triangle % len(stage.owner)][..., 2] > 0.9)
-    )
-    shown = np.flatnonzero((wanted & np.isfinite(hits.distance)) | floor)
+    met = np.isfinite(hits.distance)
+    triangle = np.where(met, hits.triangle, 0)
+    wanted = met & (stage.owner >= 0)[triangle]
+    shown = np.flatnonzero(wanted | (met & (stage.normals[:, 2] > 0.9)[triangle]) if options.floor else wanted)
     pick = rng.choice(shown, min(quota, len(shown)), replace=False)
     d = toward.reshape(-1, 3)
     body = (eye + hits.distance.ravel()[pick, None] * d[pick], hits.triangle.ravel()[pick], d[pick])
@@ -133,19 +129,21 @@ def _kept(stage, camera: Camera, poses: np.ndarray, samples: _Samples, options: 
 
 def _views_seeing(stage, camera: Camera, poses, samples: _Samples, least_cosine: float) -> np.ndarray:
     """(N,) how many views see each point, unhidden and not too much from the side."""
+    from kerfwright.synthetic._shading import looked_at
+
     normal = stage.normals[samples.triangle]
     start = (samples.x + 0.05 * normal).astype(np.float32)
     out = np.zeros(len(start), int)
     size = np.array([camera.width, camera.height])
     for pose in poses:
-        x = samples.x @ pose[:3, :3].T + pose[:3, 3]
+        eye = -pose[:3, :3].T @ pose[:3, 3]
+        idx = np.flatnonzero(looked_at(start, normal, eye, least_cosine))
+        x = samples.x[idx] @ pose[:3, :3].T + pose[:3, 3]
         with np.errstate(invalid="ignore"):
             pixels = camera.project(x)
-            framed = ((pixels > 0) & (pixels < size)).all(axis=1)
-        toward = (-pose[:3, :3].T @ pose[:3, 3] - start).astype(np.float32)
-        cosine = np.einsum("ij,ij->i", toward, normal) / np.linalg.norm(toward, axis=1)
-        idx = np.flatnonzero(framed & (cosine > least_cosine))
-        out[idx] += ~stage.scene.blocked(start[idx], toward[idx], far=1.0)
+            idx = idx[((pixels > 0) & (pixels < size)).all(axis=1)]
+        toward = (eye - start[idx]).astype(np.float32)
+        out[idx] += ~stage.scene.blocked(start[idx], toward, far=1.0)
     return out
 
 
@@ -184,6 +182,6 @@ def _averaged(x: np.ndarray, normal: np.ndarray, radius: float, neighbours: int 
 
     _, idx = cKDTree(x).query(x, neighbours, distance_upper_bound=radius, workers=-1)
     padded = np.concatenate([normal, np.zeros((1, 3))])
-    total = padded[idx].sum(axis=1)
+    total = sum(padded[idx[:, k]] for k in range(neighbours))
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.where(length > 1e-6, total / np.maximum(length, 1e-6), normal)

@@ -12,7 +12,7 @@ from kerfwright.synthetic.stage import Stage
 __all__ = ["developed", "photograph"]
 
 GAIN = 1.3  # exposes light wood in the open to about 200 of 255
-GLOSS_POWER = 60  # exponent of the highlight's lobe: satin lacquer
+BAND = 32  # rows of pixels at a time: their rays and hits stay in the processor's cache
 
 
 def photograph(
@@ -31,41 +31,25 @@ def photograph(
     """
     samples = stage.options.samples
     rays = camera_rays(camera, samples) if rays is None else rays
-    toward = rays @ camera_from_model[:3, :3].astype(np.float32)
-    eye = -camera_from_model[:3, :3].T @ camera_from_model[:3, 3]
-    hits = stage.scene.cast(eye, toward)
-    linear = _linear(stage, eye.astype(np.float32), toward, hits)
-    picture = linear.reshape(camera.height, samples, camera.width, samples, 3).mean(axis=(1, 3))
+    picture = np.empty((camera.height, camera.width, 3), np.float32)
+    for top in range(0, camera.height, BAND):
+        band = rays[top * samples : (top + BAND) * samples]
+        _fill(picture[top : top + BAND], stage, band, camera_from_model)
     return _exposed(picture, stage.options, rng)
 
 
-def _linear(stage: Stage, eye: np.ndarray, toward: np.ndarray, hits) -> np.ndarray:
-    """Linear colours of rays (rows, columns, 3)."""
-    seen = np.isfinite(hits.distance)
-    out = np.full((*hits.distance.shape, 3), 1.6, np.float32)  # beyond the walls: a bright ceiling
-    triangle, d = hits.triangle[seen], toward[seen]
-    x = eye + hits.distance[seen][:, None] * d
-    colour = stage.colour(x, triangle)
-    wood = np.flatnonzero(stage.owner[triangle] >= 0)
-    if stage.options.gloss and len(wood):
-        colour[wood] += _gloss(stage, x[wood], d[wood], stage.normals[triangle[wood]])
-    out[seen] = colour
-    return out
+def _fill(out: np.ndarray, stage: Stage, rays: np.ndarray, camera_from_model: np.ndarray) -> None:
+    """Linear colours (rows, columns, 3) of the pixels that rays (rows * samples, columns * samples, 3) pass."""
+    from kerfwright.synthetic._shading import aimed, shaded
 
-
-def _gloss(stage: Stage, x: np.ndarray, toward: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Mirror images of the windows, spread by a satin surface; stronger at a grazing look (Schlick 1994)."""
-    d = toward / np.linalg.norm(toward, axis=1, keepdims=True)
-    cosine = np.einsum("ij,ij->i", d, normal)
-    mirrored = d - 2 * cosine[:, None] * normal
-    strength = stage.options.gloss * (0.04 + 0.96 * (1 - np.abs(cosine).clip(0, 1)) ** 5)
-    out = np.zeros_like(x)
-    for middle, power in zip(stage.light.windows, stage.light.power, strict=True):
-        to_window = middle.astype(np.float32) - x
-        to_window /= np.linalg.norm(to_window, axis=1, keepdims=True)
-        lobe = np.einsum("ij,ij->i", mirrored, to_window).clip(0) ** GLOSS_POWER
-        out += (8 * strength * lobe)[:, None] * power.astype(np.float32)
-    return out
+    eye = -camera_from_model[:3, :3].T @ camera_from_model[:3, 3]
+    model_from_camera = np.ascontiguousarray(camera_from_model[:3, :3].T, np.float32)
+    laid = aimed(rays, model_from_camera, eye.astype(np.float32))
+    hits, light = stage.scene.cast_laid(laid), stage.light
+    shaded(
+        laid, hits.distance, hits.triangle, stage.texel_from_model, stage.radiance, stage.normals, stage.owner >= 0,
+        light.windows.astype(np.float32), light.power.astype(np.float32), stage.options.gloss, out,
+    )  # fmt: skip
 
 
 def developed(linear: np.ndarray, gain: float | np.ndarray = GAIN) -> np.ndarray:
@@ -80,7 +64,7 @@ def _exposed(linear: np.ndarray, options: ImageOptions, rng: np.random.Generator
     import cv2
 
     gain = GAIN * np.exp(rng.normal(0, options.exposure)) * (1 + rng.normal(0, options.white_balance, 3))
-    picture = developed(linear, gain).astype(np.float32)
+    picture = developed(linear, gain.astype(np.float32))
     if options.blur:
         picture = cv2.GaussianBlur(picture, (0, 0), options.blur)
     spread = np.sqrt(options.read_noise**2 + options.shot_noise**2 * picture / 255)

@@ -46,7 +46,11 @@ class RayScene:
 
     def cast(self, start: np.ndarray, toward: np.ndarray) -> Hits:
         """First hits of rays: start (N, 3) or (3,), toward (N, 3)."""
-        found = self._scene.cast_rays(self._rays(start, toward))
+        return self.cast_laid(_laid(start, toward))
+
+    def cast_laid(self, rays: np.ndarray) -> Hits:
+        """First hits of rays (..., 6): float32 start and direction."""
+        found = self._scene.cast_rays(self._tensor(rays))
         return Hits(found["t_hit"].numpy(), found["primitive_ids"].numpy().astype(np.int64))
 
     def distance(self, start: np.ndarray, toward: np.ndarray) -> np.ndarray:
@@ -55,16 +59,18 @@ class RayScene:
 
     def blocked(self, start: np.ndarray, toward: np.ndarray, far: float = np.inf) -> np.ndarray:
         """Whether rays (N,) meet anything before `far` times their direction."""
-        return self._scene.test_occlusions(self._rays(start, toward), tnear=0.0, tfar=float(far)).numpy()
+        return self._scene.test_occlusions(self._tensor(_laid(start, toward)), tnear=0.0, tfar=float(far)).numpy()
 
     def within(self, x: np.ndarray) -> np.ndarray:
         """Whether points (N, 3) lie inside a closed mesh."""
         return self._scene.compute_occupancy(self._tensor(x.astype(np.float32))).numpy() > 0.5
 
-    def _rays(self, start: np.ndarray, toward: np.ndarray):
-        rays = np.empty((*toward.shape[:-1], 6), np.float32)
-        rays[..., :3], rays[..., 3:] = start, toward
-        return self._tensor(rays)
+
+def _laid(start: np.ndarray, toward: np.ndarray) -> np.ndarray:
+    """(..., 6) float32, as Embree wants rays."""
+    rays = np.empty((*toward.shape[:-1], 6), np.float32)
+    rays[..., :3], rays[..., 3:] = start, toward
+    return rays
 
 
 @dataclass(frozen=True, eq=False)
