@@ -87,3 +87,26 @@ def test_the_pieces_are_boards_that_meet_at_the_seams(tone, areas):
             along = segment.end - segment.start
             middle = np.array(board.region.representative_point().coords[0]) - segment.start
             assert along[0] * middle[1] - along[1] * middle[0] > 0
+
+
+def grained(beside):
+    """Boards of one tone whose grain runs along them: `beside` tells where the left and right ones are."""
+    def tone(x, y):
+        across, up = np.sin(x / 0.9 + np.sin(y / 40)), np.sin(y / 0.9 + np.sin(x / 40))
+        return 160.0 + 6 * np.where(beside(x, y), across, up)
+    return tone
+
+
+def test_the_grain_tells_a_mitre_between_boards_of_one_tone():
+    seams = seams_of(grained(lambda x, y: np.minimum(x, 400 - x) < np.minimum(y, 300 - y)))
+    ends = sorted((*np.round(s.start), *np.round(s.end)) for s in seams)
+    assert ends == [(60, 60, 0, 0), (60, 240, 0, 300), (340, 60, 400, 0), (340, 240, 400, 300)]
+
+
+@pytest.mark.parametrize("beside, ends", [
+    (lambda x, y: (y > 60) & (y < 240), [(60, 60, 0, 60), (60, 240, 0, 240), (340, 60, 400, 60), (340, 240, 400, 240)]),
+    (lambda x, y: (x < 60) | (x > 340), [(60, 60, 60, 0), (60, 240, 60, 300), (340, 60, 340, 0), (340, 240, 340, 300)]),
+])  # fmt: skip
+def test_the_grain_tells_which_boards_run_through(beside, ends):
+    found = sorted((*np.round(s.start), *np.round(s.end)) for s in seams_of(grained(beside)))
+    assert found == ends

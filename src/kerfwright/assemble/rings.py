@@ -7,12 +7,14 @@ unless its corners show seams together: a frame sawn out of one panel has none.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
 from shapely.geometry import LineString, Point, Polygon
 
+from kerfwright.assemble.corner_grain import grain_kind
 from kerfwright.assemble.splits import SeamLine
 from kerfwright.assemble.visibility import Obstacles
 from kerfwright.identify.photo_edges import Photos, sweep_edge
@@ -165,19 +167,26 @@ def find_ring_seams(sheet: Sheet, photos: Photos, obstacles: Obstacles, diameter
     """
     corners = ring_corners(sheet.region, NARROWEST * diameter, TOLERANCE * diameter)
     shown = [_shown(sheet, corner, photos, obstacles, diameter) for corner in corners]
-    return chosen_seams(shown)
+    grain = [grain_kind(sheet, c.inner, c.ends, photos, obstacles, diameter) for c in corners]
+    return chosen_seams(shown, grain)
 
 
-def chosen_seams(shown: list[dict[str, SeamLine]]) -> list[SeamLine]:
-    """One line a corner out of those that were looked for there, by kind; none where too few corners show one."""
-    clear = [_clear_kind(lines) for lines in shown]
+def chosen_seams(shown: list[dict[str, SeamLine]], grain: Sequence[str | None]) -> list[SeamLine]:
+    """One line a corner out of those that were looked for there, by kind; none where too few corners show one.
+
+    grain: the kind that each corner's grain tells; it counts where no line is clear.
+    """
+    clear = [_clear_kind(lines) or told for lines, told in zip(shown, grain, strict=True)]
     mitres, butts = (sum(kind in kinds for kind in clear) for kinds in (("mitre",), BUTTS))
     if not shown or min(mitres, butts) or mitres + butts < LEAST_CLEAR * len(shown):
         return []
     kinds = ("mitre",) if mitres else BUTTS
     if any(not set(kinds) & set(lines) for lines in shown):
         return []
-    return [max((lines[k] for k in kinds if k in lines), key=lambda s: s.strength) for lines in shown]
+    return [
+        lines[told] if told in lines else max((lines[k] for k in kinds if k in lines), key=lambda s: s.strength)
+        for lines, told in zip(shown, clear, strict=True)
+    ]
 
 
 def _clear_kind(lines: dict[str, SeamLine]) -> str | None:
