@@ -28,6 +28,9 @@ __all__ = [
 
 
 GROUND_SHARE = 0.25  # cut-face points in the lower half of a board on the floor, of those in the upper half
+LEAST_GROUND = 0.05  # share of the outline below which such points must be seen
+STRAYS = 0.15  # of the points that a face seen well has
+BESIDE = 0.5  # density of points above a board, of that below its top: more, and the face is another board's
 STEREO_BIAS = 2.0  # standard error of a stereo plane, in units of the noise of its points
 
 
@@ -196,10 +199,20 @@ def _unhidden(
 def reaches_ground(
     frame: np.ndarray, piece: Polygon, cloud: Cloud, around: Neighbourhood, height: float
 ) -> bool:
-    """Whether a level board's cut faces go on in the lower half of its height: a shelf near the floor has air there."""
-    depth, _, _ = _cut_columns(frame, piece, cloud, around, height)
-    low, high = ((depth > a * height) & (depth < b * height) for a, b in ((0.5, 0.9), (0.1, 0.5)))
-    return bool(low.sum() > GROUND_SHARE * high.sum())
+    """Whether a level board's cut faces go on in the lower half of its height: a shelf near the floor has air there.
+
+    Faces that go on above the board as well are those of others that stand right beside it, and strays are none.
+    """
+    depth, along, length = _cut_columns(frame, piece, cloud, around, height)
+    margin, step = 3 * around.noise, 8 * around.spacing
+    _, stretch = np.unique(np.floor(along / step), return_inverse=True)
+    bins = int(stretch.max()) + 1 if len(stretch) else 0
+    above = np.bincount(stretch[depth < -margin], minlength=bins) / max(-float(depth.min(initial=0.0)) - margin, margin)
+    below = np.bincount(stretch[depth > 0.1 * height], minlength=bins) / height
+    own = (above < BESIDE * below)[stretch]
+    low, high = (own & (depth > a * height) & (depth < b * height) for a, b in ((0.5, 0.9), (0.1, 0.5)))
+    seen = np.bincount(stretch[low], minlength=bins) > STRAYS * 0.4 * height * step / around.spacing**2
+    return bool(low.sum() > GROUND_SHARE * high.sum() and seen.sum() * step > LEAST_GROUND * length)
 
 
 def looking_at(
