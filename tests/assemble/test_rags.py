@@ -30,7 +30,7 @@ def face(x0, x1, step):
 def shelf(gap=20.0, step=12.0, lift=0.0, thickness=10.0, lined=False):
     """Two pieces with a gap between them, seen badly, and a table top that was seen well."""
     points = [face(0, 150, step), face(150 + gap, 300, step), np.c_[face(0, 500, 4)[:, :2], np.full(125 * 25, 400.0)]]
-    rim = np.array([[x, y, 205.0] for x in (150.0, 150 + gap) for y in np.arange(0, 100, 2.0)]) if lined else np.zeros((0, 3))
+    rim = np.array([[x, y, 205.0] for x in (150.0, 150 + gap) for y in np.arange(0, 100, 2.0)])[: None if lined else 0]
     cloud = Cloud(np.concatenate([*points, rim]), np.tile([0, 0, 1.0], (sum(map(len, points)) + len(rim), 1)))
     ends = np.cumsum([0, *map(len, points), len(rim)])
     idx = [np.arange(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
@@ -64,7 +64,15 @@ def test_a_gap_that_was_seen_through_stays():
     assert len(joined(sheets, cloud, Everywhere((), (), 1.0, 1.0))) == 3
 
 
-def test_a_board_that_runs_through_parts_them():
+@pytest.mark.parametrize(("length", "joins"), [(40.0, True), (10.0, False)])
+def test_a_divider_that_stands_in_the_gap_hides_the_wood_under_it(length, joins):
+    sheets, cloud = shelf(gap=14.0, step=4.0)
+    divider = sheet("divider", pose((152, 30, 210), (0, 1, 0), (0, 0, 1)), 10.0, (0, 0, length, 90))
+    assert len(joined((*sheets, divider), cloud)) == (3 if joins else 4)
+
+
+@pytest.mark.parametrize(("height", "count"), [(220.0, 4), (90.0, 3)])
+def test_only_a_board_that_reaches_up_to_the_gap_parts_it(height, count):
     sheets, cloud = shelf()
-    through = sheet("through", pose((152, 0, 100), (0, 1, 0), (0, 0, 1)), 16.0, (0, 0, 100, 200))
-    assert len(joined((*sheets, through), cloud)) == 4
+    upright = sheet("upright", pose((152, 0, 100), (0, 1, 0), (0, 0, 1)), 16.0, (0, 0, 100, height))
+    assert len(joined((*sheets, upright), cloud)) == count

@@ -54,7 +54,7 @@ def test_shrunk_photographs_show_the_same_places(tmp_path):
 
 @pytest.mark.parametrize("model", sorted(CAMERA_MODELS))
 def test_every_camera_shrinks(model):
-    values = {"f": 900.0, "fx": 900.0, "fy": 905.0, "cx": 800.0, "cy": 600.0} | {name: 0.01 for name in LENS_TERMS}
+    values = {"f": 900.0, "fx": 900.0, "fy": 905.0, "cx": 800.0, "cy": 600.0} | dict.fromkeys(LENS_TERMS, 0.01)
     camera = Camera(model, 1601, 1200, tuple(values[name] for name in CAMERA_MODELS[model]))
     places = np.random.default_rng(2).uniform([-0.3, -0.3, 1], [0.3, 0.3, 2], (50, 3))
     assert np.allclose(camera.shrunk(4).project(places) * 4, camera.project(places), atol=1e-9)

@@ -13,7 +13,8 @@ from kerfwright.identify.told import Known, told_by_others
 
 NO_RIM = Rim(np.zeros((0, 2)), np.zeros((0, 2)), np.zeros(0, int), np.zeros(0, bool), np.zeros(0))
 SCENE = SimpleNamespace(
-    capture=cloud_only(Cloud(np.zeros((0, 3)), np.zeros((0, 3)))), around=None, photos=None, free=None, options=IdentifyOptions(), diameter=500.0, thickness_limits=(2.0, 80.0),
+    capture=cloud_only(Cloud(np.zeros((0, 3)), np.zeros((0, 3)))), around=None, photos=None, free=None,
+    options=IdentifyOptions(), diameter=500.0, thickness_limits=(2.0, 80.0),
     is_broad=lambda piece: True,
 )
 

@@ -18,7 +18,7 @@ from kerfwright.assemble.options import AssembleOptions
 from kerfwright.assemble.outlines import largest_piece
 from kerfwright.identify.types import Sheet
 
-__all__ = ["backed_by_ends"]
+__all__ = ["backed_by_ends", "end_sections"]
 
 SQUARE = 0.5  # cosine between the normals of a board and of one that ends on it, at most
 BESIDE = 0.6  # share of the strip on either side of an end that must be wood
@@ -43,6 +43,27 @@ def backed_by_ends(sheets: Sequence[Sheet], diameter: float, options: AssembleOp
 def _covered(sheet: Sheet, other: Sheet, face: str, slack: float) -> list[Polygon]:
     """Where the other board ends on a face, in the board's plane, and the board's wood is missing but goes on beside.
     """
+    found = []
+    for line in _end_lines(sheet, other, face, slack):
+        place = _section(sheet, other, line, 0.0)
+        if sheet.region.covers(place):
+            continue
+        sides = [_section(sheet, other, line, shift * other.thickness.value) for shift in (-1.0, 1.0)]
+        if all(side.intersection(sheet.region).area > BESIDE * side.area for side in sides):
+            found.append(place)
+    return found
+
+
+def end_sections(sheet: Sheet, other: Sheet, slack: float) -> list[Polygon]:
+    """Where the other board ends on either face of a sheet, in the sheet's plane; slack: mm that it may be short."""
+    return [
+        _section(sheet, other, line, 0.0)
+        for face in ("top", "bottom") for line in _end_lines(sheet, other, face, slack)
+    ]
+
+
+def _end_lines(sheet: Sheet, other: Sheet, face: str, slack: float) -> list[LineString]:
+    """Lines in the other board's plane along which it ends on a face, and does not go on behind the sheet."""
     trace = trace_of(other, *face_plane(sheet, face))
     if trace is None:
         return []
@@ -51,12 +72,8 @@ def _covered(sheet: Sheet, other: Sheet, face: str, slack: float) -> list[Polygo
     for line in getattr(_chord(other, trace, slack), "geoms", []):
         on_plane = _shifted(line, -slack * trace.m)
         goes_on = behind.intersection(on_plane.buffer(2 * slack + sheet.thickness.value)).length
-        place = _section(sheet, other, on_plane, 0.0)
-        if goes_on > GOES_ON * line.length or sheet.region.covers(place):
-            continue
-        sides = [_section(sheet, other, on_plane, shift * other.thickness.value) for shift in (-1.0, 1.0)]
-        if all(side.intersection(sheet.region).area > BESIDE * side.area for side in sides):
-            found.append(place)
+        if goes_on <= GOES_ON * line.length:
+            found.append(on_plane)
     return found
 
 

@@ -67,8 +67,8 @@ def look_for_end(
     """Whether b, whose outline stops short of a, is seen to run on up to it: an edge that most stretches and views show
     at the plane, and no clearer one before it.
 
-    window: mm that the edge may be off; fringe: mm by which the outline may be too large; beside: mm before the plane in
-    which an edge speaks for the plane as well, for boards so near are connected. None when no photograph shows the
+    window: mm that the edge may be off; fringe: mm by which the outline may be too large; beside: mm before the plane
+    in which an edge speaks for the plane as well, for boards so near are connected. None when no photograph shows the
     place.
     """
     found = []

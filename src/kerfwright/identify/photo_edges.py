@@ -68,7 +68,8 @@ def sweep_edge(
 
     places (N, 3) world mm, neighbours in order along the edge; direction (3,) or (N, 3) unit; offsets (T,) mm, evenly
     spaced; visible (V, N) bool: which view shows which place, or (V, N, T): at which offset. smoothing: mm of the step
-    detector. chunk: places averaged before the step is measured. None when no view shows a whole chunk, or offsets are too few for a step.
+    detector. chunk: places averaged before the step is measured. None when no view shows a whole chunk, or there is
+    only one offset.
     """
     if len(offsets) < 2:
         return None
