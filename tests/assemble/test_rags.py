@@ -1,5 +1,7 @@
 """Pieces of one board that the cloud shows apart are joined, and only those."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -33,7 +35,7 @@ def shelf(gap=20.0, step=12.0, lift=0.0, thickness=10.0, lined=False):
     rim = np.array([[x, y, 205.0] for x in (150.0, 150 + gap) for y in np.arange(0, 100, 2.0)])[: None if lined else 0]
     cloud = Cloud(np.concatenate([*points, rim]), np.tile([0, 0, 1.0], (sum(map(len, points)) + len(rim), 1)))
     ends = np.cumsum([0, *map(len, points), len(rim)])
-    idx = [np.arange(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    idx = [np.arange(a, b) for a, b in pairwise(ends)]
     cut = {"cut_idx": idx[3]}
     one = sheet("one", LEVEL, 10.0, (0, 0, 150, 100), top_idx=idx[0], **cut)
     two = sheet("two", pose((0, 0, 200 + lift)), thickness, (150 + gap, 0, 300, 100), top_idx=idx[1], **cut)

@@ -1,12 +1,15 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from shapely.geometry import box
 
 from clouds import box_cloud, pose
 from kerfwright.identify import IdentifyOptions
+from kerfwright.identify.bars import Bar
 from kerfwright.identify.primitives import look_around
 from kerfwright.identify.sheets import join_across, to_sheet
-from kerfwright.identify.slabs import Slab, footprint, plane_frame
+from kerfwright.identify.slabs import Slab, _above_floor, _ends_above, _is_parted, footprint, plane_frame
 from kerfwright.identify.thickness import ThicknessHypothesis
 from kerfwright.model import Origin
 
@@ -128,3 +131,45 @@ def test_inferred_thickness_is_not_called_seen():
     sheet = to_sheet("b", rough, cloud, look_around(cloud, IdentifyOptions()), IdentifyOptions())
     assert not sheet.thickness_seen
     assert sheet.thickness.origin is Origin.INFERRED
+
+
+def edge(value: float, support: float) -> ThicknessHypothesis:
+    return ThicknessHypothesis(value, 0.1, "photos", support)
+
+
+@pytest.mark.parametrize(("photos", "above"), [
+    ([edge(9.0, 4.2), edge(30.0, 2.4)], True), ([edge(9.0, 4.2), edge(30.0, 4.0)], False), ([edge(9.0, 3.0)], False),
+    ([edge(30.0, 5.0)], False), ([], False),
+])  # fmt: skip
+def test_a_clear_end_above_the_floor_is_believed(photos, above):
+    assert _ends_above(photos, 30.0) is above
+
+
+@pytest.mark.parametrize(("height", "value", "evidence"), [
+    (8.0, 8.0, "ground"), (30.0, 16.0, "inferred"), (1.0, 16.0, "inferred"),
+])  # fmt: skip
+def test_no_guessed_thickness_goes_through_the_floor(height, value, evidence):
+    scene = SimpleNamespace(thickness_limits=(2.0, 80.0), around=SimpleNamespace(noise=0.2))
+    guess = ThicknessHypothesis(16.0, 6.0, "inferred", 1.0)
+    level = _above_floor(guess, plane_frame(np.array([0, 0, 1.0]), np.array([0, 0, height])), scene)
+    assert (level.value, level.evidence) == (value, evidence)
+    upright_frame = plane_frame(np.array([1.0, 0, 0]), np.array([0, 0, height]))
+    assert _above_floor(guess, upright_frame, scene) is guess
+
+
+@pytest.mark.parametrize(("frame", "parted"), [
+    (box(-200, 0, 200, 300), True),  # goes on to both sides of the feet
+    (box(-200, 0, 12, 300), False),  # ends with them: they may go on
+])  # fmt: skip
+def test_feet_on_both_sides_of_a_frame_are_no_bar(frame, parted):
+    """A frame at y = -10..10 with a foot 20 mm thick before and behind it, x = -10..10, and the bar between their ends.
+    """
+    upright = np.array([[1.0, 0, 0, 0], [0, 0, -1, 10], [0, 1, 0, 0], [0, 0, 0, 1]])
+    across = slab(upright, frame.difference(box(-10, 0, 10, 50)), 20.0)
+    spans = ((10, 0, 90, 50), (-90, 0, -10, 50))
+    feet = [slab(pose((-10, 0, 0), (0, 1, 0), (0, 0, 1)), box(*span), 20.0) for span in spans]
+    bar_frame = np.array([[0, 0, 1.0, -10], [0, 1, 0, 0], [-1, 0, 0, 25], [0, 0, 0, 1]])
+    bar = Bar(bar_frame, ThicknessHypothesis(20.0, 0.1, "ends", 1.0), box(-25, -90, 25, 90), (0, 1))
+    ends = [np.array([[0.0, y, z] for z in (10, 25, 40)]) for y in (90.0, -90.0)]
+    assert _is_parted(SimpleNamespace(fringe=8.0), bar, ends, [across, *feet]) is parted
+    assert not _is_parted(SimpleNamespace(fringe=8.0), bar, ends, feet)

@@ -3,6 +3,7 @@ import pytest
 from shapely.geometry import box
 
 from clouds import box_cloud, pose, shelf_capture
+from kerfwright.capture.types import Cloud
 from kerfwright.identify import IdentifyOptions
 from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.primitives import find_planes, look_around
@@ -12,6 +13,7 @@ from kerfwright.identify.thickness import (
     from_cut_faces,
     from_opposite,
     from_photos,
+    reaches_ground,
     sharpened,
 )
 
@@ -103,3 +105,25 @@ def test_photographs_sharpen_a_thickness_by_its_weight():
 def test_photographs_that_say_something_else_change_nothing(value, support):
     coarse = ThicknessHypothesis(18.4, 0.4, "opposite", 1000.0)
     assert sharpened(coarse, [ThicknessHypothesis(value, 0.2, "photos", support)]) is coarse
+
+
+SHELF_TOP = pose((0, 0, 30))
+SHELF_REGION = box(0, 0, 300, 200)
+
+
+@pytest.mark.parametrize(("boxes", "reaches"), [
+    ([((0, 0, 0), (300, 200, 30))], True),  # solid down to the floor
+    ([((0, 0, 22), (300, 200, 30))], False),  # air below
+    ([((0, 0, 22), (300, 200, 30)), ((-5, -5, 0), (0, 205, 100)), ((300, -5, 0), (305, 205, 100))], False),
+])  # fmt: skip
+def test_only_cut_faces_of_its_own_take_a_board_down_to_the_floor(boxes, reaches):
+    cloud = box_cloud(*boxes, spacing=3.0)
+    assert reaches_ground(SHELF_TOP, SHELF_REGION, cloud, look_around(cloud, IdentifyOptions()), 30.0) is reaches
+
+
+def test_strays_below_a_shelf_do_not_take_it_down_to_the_floor():
+    rng = np.random.default_rng(3)
+    shelf = box_cloud(((0, 0, 22), (300, 200, 30)), spacing=3.0)
+    few = np.c_[rng.uniform(0, 300, 60), np.zeros(60), rng.uniform(0, 22, 60)]
+    cloud = Cloud(np.concatenate([shelf.points, few]), np.concatenate([shelf.normals, np.tile([0, -1.0, 0], (60, 1))]))
+    assert not reaches_ground(SHELF_TOP, SHELF_REGION, cloud, look_around(cloud, IdentifyOptions()), 30.0)
