@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kerfwright.capture import Camera, Capture, Cloud, View, open_capture, write_colmap_text, write_ply
+from kerfwright.capture import Capture, Cloud, View, open_capture, write_colmap_text, write_ply
 
 __all__ = ["with_images", "with_pixels", "with_points"]
 
@@ -56,14 +56,7 @@ def _copied(view: View, path: Path, factor: float) -> View:
         return view
     import cv2
 
-    camera = _shrunk(view.camera, factor)
+    camera = view.camera.scaled(factor)
     small = cv2.resize(view.image(), (camera.width, camera.height), interpolation=cv2.INTER_AREA)
     cv2.imwrite(str(path), small[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 95])
     return replace(view, camera=camera, path=path)
-
-
-def _shrunk(camera: Camera, factor: float) -> Camera:
-    """Focal length and principal point follow the size; distortion has no unit."""
-    lengths = 3 if camera.model in ("SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL") else 4
-    params = tuple(p * factor if k < lengths else p for k, p in enumerate(camera.params))
-    return Camera(camera.model, round(camera.width * factor), round(camera.height * factor), params)

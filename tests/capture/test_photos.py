@@ -57,5 +57,5 @@ def test_every_camera_shrinks(model):
     values = {"f": 900.0, "fx": 900.0, "fy": 905.0, "cx": 800.0, "cy": 600.0} | dict.fromkeys(LENS_TERMS, 0.01)
     camera = Camera(model, 1601, 1200, tuple(values[name] for name in CAMERA_MODELS[model]))
     places = np.random.default_rng(2).uniform([-0.3, -0.3, 1], [0.3, 0.3, 2], (50, 3))
-    assert np.allclose(camera.shrunk(4).project(places) * 4, camera.project(places), atol=1e-9)
-    assert (camera.shrunk(4).width, camera.shrunk(4).height) == (400, 300)
+    assert np.allclose(camera.scaled(1 / 4).project(places) * 4, camera.project(places), atol=1e-9)
+    assert (camera.scaled(1 / 4).width, camera.scaled(1 / 4).height) == (400, 300)

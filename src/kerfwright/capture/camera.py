@@ -53,11 +53,11 @@ class Camera:
         fx, fy = p.get("fx", p.get("f")), p.get("fy", p.get("f"))
         return np.array([[fx, 0, p["cx"]], [0, fy, p["cy"]], [0, 0, 1.0]])
 
-    def shrunk(self, factor: int) -> Camera:
-        """The camera of a picture in which factor x factor pixels became one; what is left over at the rim is cut off.
-        """
-        scaled = {name: value if name in LENS_TERMS else value / factor for name, value in self._named().items()}
-        return Camera(self.model, self.width // factor, self.height // factor, tuple(scaled.values()))
+    def scaled(self, factor: float) -> Camera:
+        """The camera of the picture made larger by a factor; part of a pixel that is left over at the rim is cut off."""
+        values = tuple(v if name in LENS_TERMS else v * factor for name, v in self._named().items())
+        width, height = (int(size * factor + 1e-6) for size in (self.width, self.height))
+        return Camera(self.model, width, height, values)
 
     @property
     def distortion(self) -> np.ndarray:

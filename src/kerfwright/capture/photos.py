@@ -30,7 +30,7 @@ def lightened(capture: Capture, most_bytes: int = MOST_BYTES) -> Capture:
     factor = int(np.ceil(np.sqrt(total / most_bytes))) if total else 1
     if factor <= 1:
         return capture
-    views = tuple(replace(v, camera=v.camera.shrunk(factor), shrink=factor) for v in capture.views)
+    views = tuple(replace(v, camera=v.camera.scaled(1 / factor), shrink=factor) for v in capture.views)
     note = (
         f"the {len(views)} photographs take {total / 2**30:.1f} GiB of memory: of each, {factor} x {factor} pixels are "
         "averaged to one"
