@@ -28,6 +28,7 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     from kerfwright.assemble.constraints import constraint_segments
     from kerfwright.assemble.contacts import to_contact
     from kerfwright.assemble.covered import backed_by_ends
+    from kerfwright.assemble.crossings import crossings_settled
     from kerfwright.assemble.depths import remeasured
     from kerfwright.assemble.flush import flush_neighbours
     from kerfwright.assemble.gaps import mended
@@ -36,6 +37,7 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     from kerfwright.assemble.snap import moved_with, snapped_to_stock
     from kerfwright.assemble.stock import share_thickness
     from kerfwright.assemble.veils import still_open, unveiled
+    from kerfwright.assemble.visibility import Obstacles
     from kerfwright.identify.freespace import see_through
     from kerfwright.identify.photo_edges import Photos
 
@@ -47,6 +49,8 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     edges: tuple[tuple[ConstraintSegment, ...], ...] = tuple(() for _ in sheets)
     if options.rough:
         sheets = pieced_together(sheets, capture.cloud, free, options)
+        shrunk = Obstacles(sheets, options.outline_error * diameter)
+        sheets = crossings_settled(sheets, capture.cloud, photos, shrunk)
         sheets, edges = unveiled(sheets, capture.cloud, photos, options)
     else:
         sheets = remeasured(sheets, capture.cloud, photos, parts.noise)

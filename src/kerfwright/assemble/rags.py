@@ -25,7 +25,7 @@ from kerfwright.capture.types import Cloud
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.types import Sheet
 
-__all__ = ["pieced_together"]
+__all__ = ["in_one_plane", "pieced_together", "with_own_points"]
 
 PARALLEL = 1 - 1e-6  # cosine between pieces of one board, once aligned
 LEVEL = 1 / 250  # of D, between their faces
@@ -38,6 +38,20 @@ WIDER = 1.5  # times a board's thickness, that a gap under it may be wide
 STOOD_ON = 0.25  # share of a gap under the ends of boards, as far as they were seen
 WAY = 400  # places between the middles of two pieces
 THROUGH = 0.25  # of a gap, that lies in another board
+
+
+def with_own_points(piece: Sheet, points: np.ndarray, slack: float) -> Sheet:
+    """One of several pieces of a board, with those of the board's points that lie on it, or within `slack` mm of it.
+
+    points: (N, 3) world, of the whole cloud.
+    """
+    around = piece.region.buffer(slack)
+
+    def own(idx: np.ndarray) -> np.ndarray:
+        xy = piece.to_board(points[idx])[:, :2]
+        return idx[shapely.contains_xy(around, xy[:, 0], xy[:, 1])]
+
+    return replace(piece, top_idx=own(piece.top_idx), bottom_idx=own(piece.bottom_idx), cut_idx=own(piece.cut_idx))
 
 
 @dataclass(frozen=True)
@@ -67,7 +81,7 @@ def pieced_together(
 
 def _joined(a: Sheet, b: Sheet, sheets: Sequence[Sheet], scene: _Scene) -> Sheet | None:
     """The two as one board, if they are one."""
-    if not _in_one_plane(a, b, LEVEL * scene.cloud.diameter):
+    if not in_one_plane(a, b, LEVEL * scene.cloud.diameter):
         return None
     other = moved_region(b, a)
     gap = _between(a.region, other, WIDEST * scene.cloud.diameter, RAGGED * scene.cloud.diameter)
@@ -88,7 +102,7 @@ def _joined(a: Sheet, b: Sheet, sheets: Sequence[Sheet], scene: _Scene) -> Sheet
     )
 
 
-def _in_one_plane(a: Sheet, b: Sheet, level: float) -> bool:
+def in_one_plane(a: Sheet, b: Sheet, level: float) -> bool:
     """Whether both faces of b lie in those of a."""
     if abs(a.normal @ b.normal) < PARALLEL:
         return False

@@ -15,6 +15,7 @@ import shapely
 from shapely.geometry import LineString, Point, Polygon
 
 from kerfwright.assemble.corner_grain import grain_kind
+from kerfwright.assemble.rags import with_own_points
 from kerfwright.assemble.splits import SeamLine
 from kerfwright.assemble.visibility import Obstacles
 from kerfwright.identify.photo_edges import Photos, sweep_edge
@@ -251,15 +252,4 @@ def split_ring(sheet: Sheet, seams: list[SeamLine], points: np.ndarray, diameter
         pieces += [part for part in parts if part.contains(middle) and sheet.region.contains(middle)]
     if len(pieces) != len(seams):
         return []
-    return [_own(sheet, piece, points, diameter / 500) for piece in pieces]
-
-
-def _own(sheet: Sheet, region: Polygon, points: np.ndarray, slack: float) -> Sheet:
-    around = region.buffer(slack)
-
-    def inside(idx: np.ndarray) -> np.ndarray:
-        xy = sheet.to_board(points[idx])[:, :2]
-        return idx[shapely.contains_xy(around, xy[:, 0], xy[:, 1])]
-
-    idx = {name: inside(getattr(sheet, name)) for name in ("top_idx", "bottom_idx", "cut_idx")}
-    return replace(sheet, region=region, **idx)
+    return [with_own_points(replace(sheet, region=piece), points, diameter / 500) for piece in pieces]

@@ -54,7 +54,7 @@ class Camera:
         return np.array([[fx, 0, p["cx"]], [0, fy, p["cy"]], [0, 0, 1.0]])
 
     def scaled(self, factor: float) -> Camera:
-        """The camera of the picture made larger by a factor; part of a pixel that is left over at the rim is cut off."""
+        """The camera of the picture made larger by a factor; what is left over of a pixel at the rim is cut off."""
         values = tuple(v if name in LENS_TERMS else v * factor for name, v in self._named().items())
         width, height = (int(size * factor + 1e-6) for size in (self.width, self.height))
         return Camera(self.model, width, height, values)

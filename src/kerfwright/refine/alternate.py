@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-import shapely
 from shapely.geometry import Polygon
 
 from kerfwright.assemble import AssembleOptions, assemble
 from kerfwright.assemble.apart import kept_apart
 from kerfwright.assemble.outlines import constrained_region
+from kerfwright.assemble.rags import with_own_points
 from kerfwright.assemble.rings import find_ring_seams, split_ring
 from kerfwright.assemble.splits import SeamLine, find_seam_lines, seam_contact, seam_segments, split_sheet
 from kerfwright.assemble.types import Assembly
@@ -57,21 +56,12 @@ def traced_pieces(
         for outline in board.outlines:
             region = constrained_region(outline_region(outline), known, diameter / 6, diameter / 20)
             own = replace(sheet, region=region)
-            pieces.append(Piece(_with_own_points(own, capture) if len(board.outlines) > 1 else own, outline))
+            if len(board.outlines) > 1:
+                own = with_own_points(own, capture.cloud.points, diameter / 200)
+            pieces.append(Piece(own, outline))
     if options.use_images and options.use_seams:
         pieces = _split(pieces, assembly, capture)
     return tuple(replace(p, sheet=replace(p.sheet, name=f"board_{k + 1:02d}")) for k, p in enumerate(pieces))
-
-
-def _with_own_points(piece: Sheet, capture: Capture) -> Sheet:
-    """One of several pieces of a board, with the points that lie on it or at its edge."""
-    around = piece.region.buffer(capture.cloud.diameter / 200)
-
-    def own(idx: np.ndarray) -> np.ndarray:
-        xy = piece.to_board(capture.cloud.points[idx])[:, :2]
-        return idx[shapely.contains_xy(around, xy[:, 0], xy[:, 1])]
-
-    return replace(piece, top_idx=own(piece.top_idx), bottom_idx=own(piece.bottom_idx), cut_idx=own(piece.cut_idx))
 
 
 def assembled_again(
