@@ -20,7 +20,7 @@ from kerfwright.assemble.outlines import largest_piece
 from kerfwright.assemble.rags import in_one_plane, with_own_points
 from kerfwright.assemble.visibility import Obstacles
 from kerfwright.capture.types import Cloud
-from kerfwright.identify.photo_edges import Photos, sweep_edge
+from kerfwright.identify.photo_edges import Photos, SweepResult, sweep_edge
 from kerfwright.identify.types import Sheet
 
 __all__ = ["crossings_settled"]
@@ -105,7 +105,7 @@ def _other_runs_through(crossing: _Crossing, photos: Photos, obstacles: Obstacle
 def _clearness(
     through: Sheet, ending: Sheet, crossing: _Crossing, photos: Photos, obstacles: Obstacles, size: float
 ) -> tuple[float, int]:
-    """How clearly the end faces show joints along the faces of `through`, where `ending` meets it, and in how many views.
+    """How clearly the end faces show joints along the faces of `through`, where `ending` meets it, in how many views.
     """
     axis = np.cross(through.normal, ending.normal)
     axis /= np.linalg.norm(axis)
@@ -131,7 +131,7 @@ def _corners(sheet: Sheet) -> np.ndarray:
 def _swept(
     through: Sheet, ending: Sheet, height: float, level: np.ndarray, outward: np.ndarray, photos: Photos,
     obstacles: Obstacles,
-):
+) -> SweepResult | None:
     """The line on an end face at some height in `through`, from one face of `ending` to the other, swept across."""
     share = np.linspace(INNER, 1 - INNER, PLACES) * ending.thickness.value
     planes = np.array([through.normal, ending.normal, outward])
