@@ -24,20 +24,10 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     Raises StageError when the alignment does not converge.
     """
     from kerfwright.assemble.align import align_sheets
-    from kerfwright.assemble.backs import measured_backs
-    from kerfwright.assemble.constraints import constraint_segments
     from kerfwright.assemble.contacts import to_contact
-    from kerfwright.assemble.covered import backed_by_ends
-    from kerfwright.assemble.crossings import crossings_settled
     from kerfwright.assemble.depths import remeasured
-    from kerfwright.assemble.flush import flush_neighbours
-    from kerfwright.assemble.gaps import mended
-    from kerfwright.assemble.laid import laid_contacts, laid_on
-    from kerfwright.assemble.rags import pieced_together
-    from kerfwright.assemble.snap import moved_with, snapped_to_stock
-    from kerfwright.assemble.stock import share_thickness
-    from kerfwright.assemble.veils import still_open, unveiled
-    from kerfwright.assemble.visibility import Obstacles
+    from kerfwright.assemble.laid import laid_contacts
+    from kerfwright.assemble.veils import still_open
     from kerfwright.identify.freespace import see_through
     from kerfwright.identify.photo_edges import Photos
 
@@ -46,28 +36,65 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     sheets, _ = align_sheets(parts.sheets, capture.cloud, options)
     free = see_through(capture, parts.spacing, max(5 * parts.noise, diameter / 150))
     photos = Photos(capture)
-    edges: tuple[tuple[ConstraintSegment, ...], ...] = tuple(() for _ in sheets)
     if options.rough:
-        sheets = pieced_together(sheets, capture.cloud, free, options)
-        shrunk = Obstacles(sheets, options.outline_error * diameter)
-        sheets = crossings_settled(sheets, capture.cloud, photos, shrunk)
-        sheets, edges = unveiled(sheets, capture.cloud, photos, options)
+        sheets, edges = _whole(sheets, capture.cloud, photos, free, options)
     else:
-        sheets = remeasured(sheets, capture.cloud, photos, parts.noise)
-    sheets = measured_backs(sheets, photos, diameter, options)
-    sheets = backed_by_ends(mended(sheets, capture.cloud, free, options), diameter, options)
-    sheets = flush_neighbours(share_thickness(sheets, diameter, options), diameter, options)
-    sheets = laid_on(sheets, capture.cloud, free, options)
+        sheets, edges = remeasured(sheets, capture.cloud, photos, parts.noise), tuple(() for _ in sheets)
+    sheets = _with_hidden_faces(sheets, capture.cloud, photos, free, options)
     sheets, decided, segments = _met(sheets, capture.cloud, photos, free, options)
     if options.stock.sizes:
-        sheets = flush_neighbours(snapped_to_stock(sheets, decided, parts.noise, options), diameter, options)
-        sheets = laid_on(sheets, capture.cloud, free, options)
-        decided = moved_with(sheets, decided)  # last of all: segments lie on the faces that the boards have in the end
-        segments = constraint_segments(sheets, decided, diameter, options)
+        sheets, decided, segments = _snapped(sheets, decided, capture.cloud, free, parts.noise, options)
     laid = laid_contacts(sheets, options.min_contact * diameter)
     contacts = (*(to_contact(d, sheets) for d in decided), *laid)
     edges = still_open(edges, segments)
     return Assembly(sheets, contacts, tuple(a + b for a, b in zip(segments, edges, strict=True)))
+
+
+def _whole(
+    sheets: tuple[Sheet, ...], cloud: Cloud, photos: Photos, free: FreeSpace, options: AssembleOptions
+) -> tuple[tuple[Sheet, ...], tuple[tuple[ConstraintSegment, ...], ...]]:
+    """The boards of the cloud put together from their pieces, without veils, and the edges where these were cut off."""
+    from kerfwright.assemble.crossings import crossings_settled
+    from kerfwright.assemble.rags import pieced_together
+    from kerfwright.assemble.veils import unveiled
+    from kerfwright.assemble.visibility import Obstacles
+
+    sheets = pieced_together(sheets, cloud, free, options)
+    sheets = crossings_settled(sheets, cloud, photos, Obstacles(sheets, options.outline_error * cloud.diameter))
+    return unveiled(sheets, cloud, photos, options)
+
+
+def _with_hidden_faces(
+    sheets: tuple[Sheet, ...], cloud: Cloud, photos: Photos, free: FreeSpace, options: AssembleOptions
+) -> tuple[Sheet, ...]:
+    """The boards with gaps of the cloud filled, thicknesses shared, and faces where others hide them."""
+    from kerfwright.assemble.backs import measured_backs
+    from kerfwright.assemble.covered import backed_by_ends
+    from kerfwright.assemble.flush import flush_neighbours
+    from kerfwright.assemble.gaps import mended
+    from kerfwright.assemble.laid import laid_on
+    from kerfwright.assemble.stock import share_thickness
+
+    sheets = measured_backs(sheets, photos, cloud.diameter, options)
+    sheets = backed_by_ends(mended(sheets, cloud, free, options), cloud.diameter, options)
+    sheets = flush_neighbours(share_thickness(sheets, cloud.diameter, options), cloud.diameter, options)
+    return laid_on(sheets, cloud, free, options)
+
+
+def _snapped(
+    sheets: tuple[Sheet, ...], decided: list[Decided], cloud: Cloud, free: FreeSpace, noise: float,
+    options: AssembleOptions,
+) -> tuple[tuple[Sheet, ...], list[Decided], tuple[tuple[ConstraintSegment, ...], ...]]:
+    """The boards of stock thicknesses, with their contacts and segments on the faces that they then have."""
+    from kerfwright.assemble.constraints import constraint_segments
+    from kerfwright.assemble.flush import flush_neighbours
+    from kerfwright.assemble.laid import laid_on
+    from kerfwright.assemble.snap import moved_with, snapped_to_stock
+
+    sheets = flush_neighbours(snapped_to_stock(sheets, decided, noise, options), cloud.diameter, options)
+    sheets = laid_on(sheets, cloud, free, options)
+    decided = moved_with(sheets, decided)  # last of all: segments lie on the faces that the boards have in the end
+    return sheets, decided, constraint_segments(sheets, decided, cloud.diameter, options)
 
 
 def _met(

@@ -66,9 +66,10 @@ def grain_kind(
 def _kind(grain: _Grain, quad: list[np.ndarray], ways: dict[str, np.ndarray]) -> str | None:
     inner, before, outer, after = quad
     width = max(np.linalg.norm(before - inner), np.linalg.norm(after - inner))
-    members = [  # the boards on either side of the corner, beyond its own square
-        grain.inside(Polygon([inner, after, after - way, inner - way])) for way in [MEMBER * width * ways["before"]]
-    ] + [grain.inside(Polygon([inner, before, before - way, inner - way])) for way in [MEMBER * width * ways["after"]]]
+    members = []  # the boards on either side of the corner, beyond its own square
+    for end, kind in ((after, "before"), (before, "after")):
+        way = MEMBER * width * ways[kind]
+        members.append(grain.inside(Polygon([inner, end, end - way, inner - way])))
     halves = [grain.inside(Polygon(p)) for p in ([inner, outer, after], [inner, before, outer])]
     if min(map(len, (*members, *halves))) < LEAST_BLOCKS:
         return None
@@ -99,7 +100,7 @@ def _grain(
     level = sheet.thickness.value if face == "top" else 0.0
     world = sheet.to_world(np.c_[flat, np.full(len(flat), level)])
     tone = _tone(sheet, face, world, photos, obstacles, xy.shape[:2])
-    if tone is None:
+    if tone is None or not np.isfinite(tone).any():
         return None
     wood = shapely.contains_xy(sheet.region.buffer(-RIM * diameter), flat[:, 0], flat[:, 1]).reshape(xy.shape[:2])
     slope = np.gradient(gaussian_filter(np.nan_to_num(tone, nan=float(np.nanmedian(tone))), BLUR))

@@ -15,9 +15,8 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from kerfwright.assemble.laid import moved_region
+from kerfwright.assemble.coplanar import in_one_plane, moved_region, with_own_points
 from kerfwright.assemble.outlines import largest_piece
-from kerfwright.assemble.rags import in_one_plane, with_own_points
 from kerfwright.assemble.visibility import Obstacles
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.photo_edges import Photos, SweepResult, sweep_edge

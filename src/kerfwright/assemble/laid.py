@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 from shapely.geometry import MultiPolygon, Polygon
 
+from kerfwright.assemble.coplanar import moved_region
 from kerfwright.assemble.joints import face_plane
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.capture.types import Cloud
@@ -19,7 +20,7 @@ from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.types import Sheet
 from kerfwright.model import Contact, ContactEvidence, Origin
 
-__all__ = ["laid_contacts", "laid_on", "moved_region"]
+__all__ = ["laid_contacts", "laid_on"]
 
 PARALLEL = 1 - 1e-9  # cosine: one class of the alignment
 TOUCHING = 1e-6  # mm; faces that were put together
@@ -130,16 +131,6 @@ def _pair(sheets: tuple[Sheet, ...], a: int, b: int, face_a: str, face_b: str, s
         return None
     overlap = one.region.intersection(moved_region(other, one))
     return _Pair(a, b, face_a, face_b, gap, overlap) if overlap.area > shortest**2 else None
-
-
-def moved_region(sheet: Sheet, to: Sheet) -> Polygon:
-    """A board's region in the frame of a parallel one."""
-
-    def ring(coords) -> np.ndarray:
-        xy = np.asarray(coords)[:, :2]
-        return to.to_board(sheet.to_world(np.c_[xy, np.zeros(len(xy))]))[:, :2]
-
-    return Polygon(ring(sheet.region.exterior.coords), [ring(r.coords) for r in sheet.region.interiors]).buffer(0)
 
 
 def _link(pair: _Pair, sheets: tuple[Sheet, ...], cloud: Cloud, options: AssembleOptions) -> _Link | None:

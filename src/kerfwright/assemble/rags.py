@@ -16,18 +16,17 @@ import shapely
 from scipy.spatial import cKDTree
 from shapely.geometry import Polygon
 
+from kerfwright.assemble.coplanar import in_one_plane, moved_region
 from kerfwright.assemble.covered import end_sections
 from kerfwright.assemble.gaps import is_seen, is_thin, places_in, usual_density
-from kerfwright.assemble.laid import moved_region
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.assemble.outlines import largest_piece
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.types import Sheet
 
-__all__ = ["in_one_plane", "pieced_together", "with_own_points"]
+__all__ = ["pieced_together"]
 
-PARALLEL = 1 - 1e-6  # cosine between pieces of one board, once aligned
 LEVEL = 1 / 250  # of D, between their faces
 WIDEST = 1 / 6  # of D, between pieces
 RAGGED = 1 / 25  # of D, by which facing outlines may wander
@@ -38,20 +37,6 @@ WIDER = 1.5  # times a board's thickness, that a gap under it may be wide
 STOOD_ON = 0.25  # share of a gap under the ends of boards, as far as they were seen
 WAY = 400  # places between the middles of two pieces
 THROUGH = 0.25  # of a gap, that lies in another board
-
-
-def with_own_points(piece: Sheet, points: np.ndarray, slack: float) -> Sheet:
-    """One of several pieces of a board, with those of the board's points that lie on it, or within `slack` mm of it.
-
-    points: (N, 3) world, of the whole cloud.
-    """
-    around = piece.region.buffer(slack)
-
-    def own(idx: np.ndarray) -> np.ndarray:
-        xy = piece.to_board(points[idx])[:, :2]
-        return idx[shapely.contains_xy(around, xy[:, 0], xy[:, 1])]
-
-    return replace(piece, top_idx=own(piece.top_idx), bottom_idx=own(piece.bottom_idx), cut_idx=own(piece.cut_idx))
 
 
 @dataclass(frozen=True)
@@ -100,15 +85,6 @@ def _joined(a: Sheet, b: Sheet, sheets: Sequence[Sheet], scene: _Scene) -> Sheet
         top_idx=np.union1d(a.top_idx, top), bottom_idx=np.union1d(a.bottom_idx, bottom),
         cut_idx=np.union1d(a.cut_idx, b.cut_idx),
     )
-
-
-def in_one_plane(a: Sheet, b: Sheet, level: float) -> bool:
-    """Whether both faces of b lie in those of a."""
-    if abs(a.normal @ b.normal) < PARALLEL:
-        return False
-    middle = np.asarray(b.region.representative_point().coords[0])
-    heights = a.to_board(b.to_world(np.array([[*middle, 0.0], [*middle, b.thickness.value]])))[:, 2]
-    return bool(np.abs(np.sort(heights) - [0.0, a.thickness.value]).max() < level)
 
 
 def _between(a: Polygon, b: Polygon, widest: float, ragged: float) -> Polygon | None:

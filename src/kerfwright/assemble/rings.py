@@ -14,8 +14,8 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, Point, Polygon
 
+from kerfwright.assemble.coplanar import with_own_points
 from kerfwright.assemble.corner_grain import grain_kind
-from kerfwright.assemble.rags import with_own_points
 from kerfwright.assemble.splits import SeamLine
 from kerfwright.assemble.visibility import Obstacles
 from kerfwright.identify.photo_edges import Photos, sweep_edge

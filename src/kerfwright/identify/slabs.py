@@ -305,7 +305,7 @@ def _looked_at(scene: _Scene, seed: _Seed) -> Known:
     level = frame[2, 2] > LEVEL and low < height < high and not any(h.near(height) for h in found)
     if level and not _ends_above(photos, height) and reaches_ground(frame, piece, cloud, around, height):
         found.append(ThicknessHypothesis(float(height), 2 * around.noise, "ground", piece.area))
-    return Known(top, frame, piece, rim, tuple(found))
+    return Known(top, frame, piece, rim, tuple(found), shown=tuple(photos))
 
 
 def _above_floor(guess: ThicknessHypothesis, frame: np.ndarray, scene: _Scene) -> ThicknessHypothesis:

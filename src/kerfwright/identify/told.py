@@ -41,7 +41,8 @@ class Known:
     piece: Polygon
     rim: Rim
     hypotheses: tuple[ThicknessHypothesis, ...]
-    told: bool = False  # by others: what they fill is none of this board's
+    told: bool = False  # not by its own clear evidence: what other boards fill is none of this board's
+    shown: tuple[ThicknessHypothesis, ...] = ()  # every edge that photographs show, what hides it thought away
 
     @property
     def best(self) -> ThicknessHypothesis | None:
@@ -92,14 +93,11 @@ def _faint(known: Known, scene: _Scene) -> list[ThicknessHypothesis]:
     """Edges in the photographs that show the cut face itself, clear ones and faint ones; then those that other boards
     may hide, thought away.
     """
-    found = [
-        from_photos(
-            known.frame, known.rim, scene.photos, scene.thickness_limits,
-            step=scene.diameter * scene.options.sweep_step, free=free,
-        )
-        for free in (scene.free, None)
-    ]
-    return [h for way in found for h in way if h.support > FAINT]
+    found = from_photos(
+        known.frame, known.rim, scene.photos, scene.thickness_limits,
+        step=scene.diameter * scene.options.sweep_step, free=scene.free,
+    )
+    return [h for h in (*found, *known.shown) if h.support > FAINT]
 
 
 def _by_cut_faces(known: Known, scene: _Scene) -> ThicknessHypothesis | None:

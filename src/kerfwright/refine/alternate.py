@@ -9,8 +9,8 @@ from shapely.geometry import Polygon
 
 from kerfwright.assemble import AssembleOptions, assemble
 from kerfwright.assemble.apart import kept_apart
+from kerfwright.assemble.coplanar import with_own_points
 from kerfwright.assemble.outlines import constrained_region
-from kerfwright.assemble.rags import with_own_points
 from kerfwright.assemble.rings import find_ring_seams, split_ring
 from kerfwright.assemble.splits import SeamLine, find_seam_lines, seam_contact, seam_segments, split_sheet
 from kerfwright.assemble.types import Assembly
