@@ -21,6 +21,7 @@ from kerfwright.refine.segment.edges import PITCH, EdgeScan, trace, view_offsets
 from kerfwright.refine.segment.evidence import Bounds, behind_cut_faces, cut_face_band, seeds_of, signed_distance
 from kerfwright.refine.segment.graphcut import cut, smoothness_weights
 from kerfwright.refine.segment.grid import Grid, grid_over
+from kerfwright.refine.segment.holes import without_false_holes
 from kerfwright.refine.segment.openings import open_seeds, openings
 from kerfwright.refine.segment.rectify import even_out
 from kerfwright.refine.segment.scene import BOARD, CLEAR, OCCLUDED, Occluders, slab_mesh
@@ -447,6 +448,43 @@ def test_opening_is_outside_and_its_edge_is_asked_for() -> None:
     assert not opened.inside[GRID.mask(box(0, -5, 35, 23))].any()
     assert seeds.inside[hole].all()
     assert open_seeds(seeds, np.zeros_like(hole), 1.0) is seeds
+
+
+# --- holes that are none ---
+
+
+def views_of_wood(patch: np.ndarray, colour: tuple[float, float, float]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Five views of wood with a patch of one colour."""
+    labs, seen = views_of_a_hole(patch, moves=False)
+    rng = np.random.default_rng(4)
+    for lab in labs:
+        lab[patch] = rng.normal(colour, 1.0, (patch.sum(), 3))
+    return labs, seen
+
+
+@pytest.mark.parametrize(
+    ("colour", "moves", "stays"),
+    [((70, 8, 25), False, False), ((74, 8, 22), False, False), ((40, 8, 25), False, True), (None, True, True)],
+)
+def test_holes_in_which_the_photographs_show_the_same_wood_are_filled(colour, moves: bool, stays: bool) -> None:
+    board, hole = GRID.mask(box(-16, -16, 56, 36)), GRID.mask(box(5, 0, 30, 18))
+    labs, seen = views_of_a_hole(hole, moves=True) if moves else views_of_wood(hole, colour)
+    left = without_false_holes(board & ~hole, labs, seen, [1] * 5, 1.0)
+    assert np.array_equal(left, board & ~hole if stays else board)
+
+
+def test_hole_is_filled_though_one_view_has_a_shadow_in_it() -> None:
+    board, hole = GRID.mask(box(-16, -16, 56, 36)), GRID.mask(box(5, 0, 30, 18))
+    labs, seen = views_of_wood(hole, (70, 8, 25))
+    labs[1][hole] = (30, 0, 10)
+    assert without_false_holes(board & ~hole, labs, seen, [1] * 5, 1.0)[hole].all()
+
+
+def test_hole_that_two_views_show_is_left_to_the_cloud() -> None:
+    board, hole = GRID.mask(box(-16, -16, 56, 36)), GRID.mask(box(5, 0, 30, 18))
+    labs, seen = views_of_wood(hole, (70, 8, 25))
+    seen = [*seen[:2], *[s & ~hole for s in seen[2:]]]
+    assert not without_false_holes(board & ~hole, labs, seen, [1] * 5, 1.0)[hole].any()
 
 
 # --- views and exposure ---

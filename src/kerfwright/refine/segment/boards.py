@@ -39,6 +39,7 @@ from kerfwright.refine.segment.evidence import (
 )
 from kerfwright.refine.segment.graphcut import contrast, cut, smoothness_weights
 from kerfwright.refine.segment.grid import Grid, grid_over
+from kerfwright.refine.segment.holes import without_false_holes
 from kerfwright.refine.segment.openings import open_seeds, openings
 from kerfwright.refine.segment.options import BoardOutlines, SegmentOptions
 from kerfwright.refine.segment.rectify import Photos, even_out, rectify
@@ -187,7 +188,8 @@ def _round(
         return replace(board, views=[], shifts=[])
     weights = smoothness_weights(contrasts, board.crossing, options.smoothness)
     mask = cut(average(evidences, seeds), weights, seeds.inside, seeds.outside)
-    masks = _own(clean(mask, board.grid.pixel, options), board.rough)
+    masks = [without_false_holes(m, looks.labs, looks.seen, looks.sides, board.grid.pixel)
+             for m in _own(clean(mask, board.grid.pixel, options), board.rough)]
     if not masks:
         return replace(board, views=[], shifts=[])
     board = replace(board, masks=masks, regions=[pieces(m, board.grid) for m in masks])
