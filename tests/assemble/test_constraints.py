@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from shapely.geometry import Polygon
 
 from clouds import pose, sheet, turned
 from kerfwright.assemble import AssembleOptions
@@ -93,3 +94,15 @@ def test_a_slanted_cut_keeps_its_normal_and_depth():
     assert frame[:3, :3] @ segment.normal == pytest.approx([0, 0, 1])
     place = leaning.to_world(np.array([[*segment.start, segment.depth]]))[0]
     assert place[2] == pytest.approx(200)
+
+
+def test_a_traced_foot_ends_where_its_arch_begins():
+    """The arch rises 9 mm over 6: within reach of the floor, but higher than the rest of a foot that was traced."""
+    foot = Polygon([(0, 0), (40, 0), (46, 9), (60, 100), (0, 100)])
+    leg = sheet("leg", pose((-9, 0, 0), (0, 1, 0), (0, 0, 1)), 18.0, foot)
+    ((rough,),), ((traced,),) = (
+        constraint_segments((leg,), [], 500.0, AssembleOptions(rough=r, outline_error=e))
+        for r, e in ((True, 1 / 60), (False, 1 / 200))
+    )
+    assert np.linalg.norm(rough.end - rough.start) > 45
+    assert np.linalg.norm(traced.end - traced.start) == pytest.approx(41, abs=2)

@@ -66,6 +66,12 @@ def test_nothing_is_filled_beside_the_segment():
     assert difference(found, box(0, 0, 100, 56).union(box(0, 56, 50, 60))) < 1.0
 
 
+def test_an_arch_that_begins_within_a_ground_segment_stays():
+    """The foot's inner edge is slanted: 2 mm above the floor at the end of the segment."""
+    leg = Polygon([(0, 0), (30, 0), (36, 2), (40, 60), (0, 60)])
+    assert difference(constrained(leg, segment((0, 0), (36, 0), "ground")), leg) < 1.0
+
+
 def test_wood_beside_a_ground_segment_is_not_cut():
     """A foot stands on the floor; the other goes lower only in the tracing, beside the segment."""
     leg = box(0, 0, 40, 100).union(box(60, -3, 100, 100)).union(box(0, 80, 100, 100))

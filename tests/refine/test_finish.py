@@ -11,7 +11,10 @@ from kerfwright.model import Finding, Line
 from kerfwright.model.geometry import edge_length, path_polygon
 from kerfwright.refine import BoundaryLoop, Outline, RefineOptions, finish
 
-CAPTURE = SimpleNamespace(cloud=SimpleNamespace(diameter=450.0))  # a boundary point every millimetre
+NOTHING = np.zeros((0, 3))
+CAPTURE = SimpleNamespace(  # a boundary point every millimetre
+    cloud=SimpleNamespace(diameter=450.0, points=NOTHING, normals=NOTHING)
+)
 TOP_EDGE = ConstraintSegment(np.array([200.0, 120]), np.array([0.0, 120]), "contact", 0.15, contact=0)
 
 

@@ -87,6 +87,8 @@ def _ground(sheet: Sheet, contacts: list[Joint], diameter: float, options: Assem
     step = diameter / 200
     along, first, _ = columns(sheet.region, trace, step)
     standing = np.abs(first) < options.ground_reach * diameter
+    if standing.any() and not options.rough:  # where a traced outline is higher than elsewhere, an arch begins
+        standing &= first < 2 * max(float(np.median(first[standing])), 0.0) + options.outline_error * diameter
     for joint in contacts:
         if joint.trace.m @ trace.m > 0.9:
             for low, high in joint.intervals:

@@ -15,25 +15,31 @@ __all__ = ["constrained_region", "filled_region", "largest_piece", "segment_axes
 
 CRACK = 0.01  # mm
 SHALLOW = 0.12  # of the reach: how much deeper than usual a column may be and still be filled
+TRACED_SHALLOW = 0.03  # ... of a traced outline above the floor: an arch begins there, which photographs show
 
 
 def constrained_region(
     region: Polygon, segments: tuple[ConstraintSegment, ...], reach: float, beyond: float
 ) -> Polygon:
-    """The region run on to each segment over its length (by at most `reach`) and cut off behind it (as far as
+    """The traced region run on to each segment over its length (by at most `reach`) and cut off behind it (as far as
     `beyond`).
     """
-    region = filled_region(region, segments, reach)
+    region = filled_region(region, segments, reach, TRACED_SHALLOW)
     for segment in segments:
         widen = 0.0 if segment.origin == "ground" else beyond / 4
         region = largest_piece(region.difference(_strip(segment, -beyond, 0.0, widen)))
     return region
 
 
-def filled_region(region: Polygon, segments: tuple[ConstraintSegment, ...], reach: float) -> Polygon:
-    """The region run on to each segment over its length, by at most `reach` mm."""
+def filled_region(
+    region: Polygon, segments: tuple[ConstraintSegment, ...], reach: float, on_floor: float = SHALLOW
+) -> Polygon:
+    """The region run on to each segment over its length, by at most `reach` mm; on the floor where it is no deeper than
+    usual by more than the share `on_floor` of that.
+    """
     for segment in segments:
-        filled = shapely.union_all([region, *_filling(region, segment, reach)])
+        shallow = reach * (on_floor if segment.origin == "ground" else SHALLOW)
+        filled = shapely.union_all([region, *_filling(region, segment, reach, shallow)])
         region = largest_piece(_closed(filled))
     return region
 
@@ -58,10 +64,11 @@ def _strip(segment: ConstraintSegment, low: float, high: float, widen: float) ->
     return Polygon([a + low * inward, b + low * inward, b + high * inward, a + high * inward])
 
 
-def _filling(region: Polygon, segment: ConstraintSegment, reach: float) -> list[Polygon]:
+def _filling(region: Polygon, segment: ConstraintSegment, reach: float, shallow: float) -> list[Polygon]:
     """What lies between the segment and the region's nearest boundary, one polygon a run of columns.
 
-    Columns that are far deeper than most are left alone: there the region ends beside the segment, not before it.
+    Columns that are deeper than most by over `shallow` are left alone: there the region ends beside the segment, not
+    before it.
     """
     along, inward, length = segment_axes(segment)
     at = np.linspace(0, length, max(8, int(length / 2)))
@@ -75,7 +82,7 @@ def _filling(region: Polygon, segment: ConstraintSegment, reach: float) -> list[
     if not np.isfinite(depth).any():
         return []
     usual = float(np.median(depth[np.isfinite(depth)]))
-    fillable = depth <= 2 * usual + SHALLOW * reach
+    fillable = depth <= 2 * usual + shallow
     runs = np.split(np.arange(len(at)), np.flatnonzero(np.diff(fillable.astype(int))) + 1)
     return [_curtain(feet[run], depth[run] + 0.5, inward) for run in runs if fillable[run[0]] and len(run) > 2]
 

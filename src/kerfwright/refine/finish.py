@@ -10,13 +10,14 @@ from shapely.geometry.polygon import orient
 
 from kerfwright.assemble.outlines import constrained_region
 from kerfwright.assemble.types import Assembly, ConstraintSegment
-from kerfwright.capture.types import Capture
+from kerfwright.capture.types import Capture, Cloud
 from kerfwright.errors import StageError
 from kerfwright.model import CutPath, Finding, Line, Loop
 from kerfwright.model.geometry import edge_length
 from kerfwright.refine.boards import to_boards
 from kerfwright.refine.constrain import to_loops
 from kerfwright.refine.curves import CurveOptions, fit_curves
+from kerfwright.refine.eased import Stereo, moved_to_cut_faces, stereo_of
 from kerfwright.refine.options import Refined, RefineOptions
 from kerfwright.refine.twins import with_twins
 from kerfwright.refine.types import Fitted, Outline
@@ -31,8 +32,10 @@ def finished(outlines: tuple[Outline, ...], assembly: Assembly, capture: Capture
     """Fit every cut path on its constraint segments."""
     diameter, curves = capture.cloud.diameter, CurveOptions(use_relations=options.use_constraints)
     step = options.boundary_step * diameter
+    stereo = stereo_of(assembly.sheets, capture.cloud)
     fitted = with_twins(
-        [_fitted(k, outline, assembly, diameter, step, curves) for k, outline in enumerate(outlines)], curves
+        [_fitted(k, outline, assembly, capture.cloud, stereo, step, curves) for k, outline in enumerate(outlines)],
+        curves,
     )
     boards = to_boards(fitted)
     findings = [
@@ -43,14 +46,14 @@ def finished(outlines: tuple[Outline, ...], assembly: Assembly, capture: Capture
 
 
 def _fitted(
-    number: int, outline: Outline, assembly: Assembly, diameter: float, step: float, curves: CurveOptions
+    number: int, outline: Outline, assembly: Assembly, cloud: Cloud, stereo: Stereo, step: float, curves: CurveOptions
 ) -> Fitted:
-    sheet, segments = assembly.sheets[number], assembly.constraints[number]
+    sheet, segments, diameter = assembly.sheets[number], assembly.constraints[number], cloud.diameter
     region = constrained_region(sheet.region, segments, diameter / 6, diameter / 20)
     attempts = [(region, ()), (_smoothed(region, segments, diameter), (SMOOTHED,))]
     problem = ""
     for shape, remarks in attempts:
-        loops = to_loops(shape, outline, segments, step)
+        loops = moved_to_cut_faces(to_loops(shape, outline, segments, step), sheet, segments, cloud, stereo)
         try:
             fit = fit_curves(loops, segments, curves)
             _refuse_short_edges(fit.path)
