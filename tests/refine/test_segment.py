@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from shapely.geometry import Polygon, box
+from shapely.geometry import Point, Polygon, box
 
 from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.capture.camera import Camera
@@ -17,12 +17,13 @@ from kerfwright.refine.segment import SegmentOptions, segment_boards
 from kerfwright.refine.segment.appearance import fit_mixture, same_surface, with_shade
 from kerfwright.refine.segment.boundary import Chain, chain_of, registration, snap
 from kerfwright.refine.segment.constraints import carve, fill_to_contacts, limits_of
+from kerfwright.refine.segment.drilled import drilled_holes, drilled_seeds
 from kerfwright.refine.segment.edges import PITCH, EdgeScan, trace, view_offsets
 from kerfwright.refine.segment.evidence import Bounds, behind_cut_faces, cut_face_band, seeds_of, signed_distance
 from kerfwright.refine.segment.graphcut import cut, smoothness_weights
 from kerfwright.refine.segment.grid import Grid, grid_over
 from kerfwright.refine.segment.holes import without_false_holes
-from kerfwright.refine.segment.openings import open_seeds, openings
+from kerfwright.refine.segment.openings import disagreement, open_seeds, openings
 from kerfwright.refine.segment.rectify import even_out
 from kerfwright.refine.segment.scene import BOARD, CLEAR, OCCLUDED, Occluders, slab_mesh
 from kerfwright.refine.segment.topology import clean, pieces
@@ -401,6 +402,10 @@ def views_of_a_hole(hole: np.ndarray, moves: bool) -> tuple[list[np.ndarray], li
     return labs, [np.ones(GRID.shape, bool)] * 5
 
 
+def apart_in(labs: list[np.ndarray], seen: list[np.ndarray]) -> np.ndarray:
+    return disagreement(labs, seen, [1] * len(labs))
+
+
 def spread_points(mask: np.ndarray) -> np.ndarray:
     return GRID.centres()[mask][::3]
 
@@ -408,7 +413,7 @@ def spread_points(mask: np.ndarray) -> np.ndarray:
 def test_hole_that_the_cloud_closed_is_opened() -> None:
     board, hole = GRID.mask(box(-16, -16, 56, 36)), GRID.mask(box(5, 0, 30, 18))
     labs, seen = views_of_a_hole(hole, moves=True)
-    found = openings(labs, seen, [1] * 5, board, spread_points(board & ~hole), GRID, 4.0)
+    found = openings(labs, seen, apart_in(labs, seen), board, spread_points(board & ~hole), GRID, 4.0)
     assert (found & hole).sum() > 0.95 * hole.sum()
     assert not (found & ~hole).any()
 
@@ -416,13 +421,13 @@ def test_hole_that_the_cloud_closed_is_opened() -> None:
 def test_knot_and_shadow_look_alike_from_everywhere_and_stay() -> None:
     board, knot = GRID.mask(box(-16, -16, 56, 36)), GRID.mask(box(5, 0, 30, 18))
     labs, seen = views_of_a_hole(knot, moves=False)
-    assert not openings(labs, seen, [1] * 5, board, spread_points(board & ~knot), GRID, 4.0).any()
+    assert not openings(labs, seen, apart_in(labs, seen), board, spread_points(board & ~knot), GRID, 4.0).any()
 
 
 def test_wood_that_the_cloud_shows_is_not_opened() -> None:
     board, hidden = GRID.mask(box(-16, -16, 56, 36)), GRID.mask(box(5, 0, 30, 18))
     labs, seen = views_of_a_hole(hidden, moves=True)
-    assert not openings(labs, seen, [1] * 5, board, spread_points(board), GRID, 4.0).any()
+    assert not openings(labs, seen, apart_in(labs, seen), board, spread_points(board), GRID, 4.0).any()
 
 
 def test_one_glossy_view_opens_nothing() -> None:
@@ -431,13 +436,13 @@ def test_one_glossy_view_opens_nothing() -> None:
     for lab in labs:
         lab[glint] = (70, 8, 25)
     labs[2][glint] = (98, 0, 0)
-    assert not openings(labs, seen, [1] * 5, board, spread_points(board & ~glint), GRID, 4.0).any()
+    assert not openings(labs, seen, apart_in(labs, seen), board, spread_points(board & ~glint), GRID, 4.0).any()
 
 
 def test_open_at_the_rim_is_no_hole() -> None:
     board, bay = GRID.mask(box(-16, -16, 56, 36)), GRID.mask(box(5, -20, 30, 18))
     labs, seen = views_of_a_hole(bay, moves=True)
-    assert not openings(labs, seen, [1] * 5, board, spread_points(board & ~bay), GRID, 4.0).any()
+    assert not openings(labs, seen, apart_in(labs, seen), board, spread_points(board & ~bay), GRID, 4.0).any()
 
 
 def test_opening_is_outside_and_its_edge_is_asked_for() -> None:
@@ -469,7 +474,7 @@ def views_of_wood(patch: np.ndarray, colour: tuple[float, float, float]) -> tupl
 def test_holes_in_which_the_photographs_show_the_same_wood_are_filled(colour, moves: bool, stays: bool) -> None:
     board, hole = GRID.mask(box(-16, -16, 56, 36)), GRID.mask(box(5, 0, 30, 18))
     labs, seen = views_of_a_hole(hole, moves=True) if moves else views_of_wood(hole, colour)
-    left = without_false_holes(board & ~hole, labs, seen, [1] * 5, 1.0)
+    left = without_false_holes(board & ~hole, labs, seen, apart_in(labs, seen), 1.0)
     assert np.array_equal(left, board & ~hole if stays else board)
 
 
@@ -477,14 +482,59 @@ def test_hole_is_filled_though_one_view_has_a_shadow_in_it() -> None:
     board, hole = GRID.mask(box(-16, -16, 56, 36)), GRID.mask(box(5, 0, 30, 18))
     labs, seen = views_of_wood(hole, (70, 8, 25))
     labs[1][hole] = (30, 0, 10)
-    assert without_false_holes(board & ~hole, labs, seen, [1] * 5, 1.0)[hole].all()
+    assert without_false_holes(board & ~hole, labs, seen, apart_in(labs, seen), 1.0)[hole].all()
 
 
 def test_hole_that_two_views_show_is_left_to_the_cloud() -> None:
     board, hole = GRID.mask(box(-16, -16, 56, 36)), GRID.mask(box(5, 0, 30, 18))
     labs, seen = views_of_wood(hole, (70, 8, 25))
     seen = [*seen[:2], *[s & ~hole for s in seen[2:]]]
-    assert not without_false_holes(board & ~hole, labs, seen, [1] * 5, 1.0)[hole].any()
+    assert not without_false_holes(board & ~hole, labs, seen, apart_in(labs, seen), 1.0)[hole].any()
+
+
+# --- drilled holes ---
+
+
+def drilled(labs: list[np.ndarray], points: np.ndarray) -> np.ndarray:
+    seen = [np.ones(GRID.shape, bool)] * len(labs)
+    board = GRID.mask(box(-16, -16, 56, 36))
+    return drilled_holes(labs, seen, [1] * len(labs), apart_in(labs, seen), board, points, GRID)
+
+
+def views_of_a_bore(bore: np.ndarray, moves: bool) -> list[np.ndarray]:
+    """Five views of wood with a dark place; the stripes in it lie elsewhere in each of them, or in one place."""
+    labs, _ = views_of_wood(bore, (55, 8, 25))
+    columns = GRID.centres()[..., 0]
+    for k, lab in enumerate(labs):
+        lab[bore, 0] += 8 * np.sin(columns[bore] / 2 + 2 * k * moves)
+    return labs
+
+
+def test_small_round_hole_is_found_by_its_rim() -> None:
+    bore = GRID.mask(Point(20, 10).buffer(6.0))
+    found = drilled(views_of_a_bore(bore, moves=True), spread_points(~bore))
+    assert (found & bore).sum() > 0.9 * bore.sum()
+    assert (found & ~bore).sum() < 0.15 * bore.sum()
+
+
+def test_plug_is_no_hole_nor_is_a_dark_place_that_the_cloud_shows() -> None:
+    bore = GRID.mask(Point(20, 10).buffer(6.0))
+    assert not drilled(views_of_a_bore(bore, moves=False), spread_points(~bore)).any()
+    assert not drilled(views_of_a_bore(bore, moves=True), spread_points(np.ones(GRID.shape, bool))).any()
+
+
+def test_square_place_is_not_drilled() -> None:
+    patch = GRID.mask(box(12, 2, 28, 18))
+    assert not drilled(views_of_a_bore(patch, moves=True), spread_points(~patch)).any()
+
+
+def test_rim_of_a_drilled_hole_is_asked_for_and_wood_lies_round_it() -> None:
+    board, bore = GRID.mask(box(-16, -16, 56, 36)), GRID.mask(Point(20, 10).buffer(6.0))
+    seeds = seeds_of(board, np.zeros_like(board), np.zeros_like(board), Bounds(4.0, 8.0), 1.0)
+    told = drilled_seeds(seeds, bore, 1.0)
+    assert told.outside[GRID.mask(Point(20, 10).buffer(4.0))].all()
+    assert told.inside[GRID.mask(Point(20, 10).buffer(9.0)) & ~GRID.mask(Point(20, 10).buffer(8.0))].all()
+    assert drilled_seeds(seeds, np.zeros_like(bore), 1.0) is seeds
 
 
 # --- views and exposure ---

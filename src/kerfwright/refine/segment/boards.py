@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from shapely import union_all
@@ -21,6 +21,7 @@ from kerfwright.identify.types import Sheet
 from kerfwright.parallel import each
 from kerfwright.refine.segment.boundary import Chain, chain_of, loops_of, open_chain, registration, settle, snap
 from kerfwright.refine.segment.constraints import Limit, carve, fill_to_contacts, limits_of, margins
+from kerfwright.refine.segment.drilled import drilled_holes, drilled_seeds
 from kerfwright.refine.segment.edges import EdgeScan, agreed_strength, scan_edges
 from kerfwright.refine.segment.evidence import (
     Bounds,
@@ -40,7 +41,7 @@ from kerfwright.refine.segment.evidence import (
 from kerfwright.refine.segment.graphcut import contrast, cut, smoothness_weights
 from kerfwright.refine.segment.grid import Grid, grid_over
 from kerfwright.refine.segment.holes import without_false_holes
-from kerfwright.refine.segment.openings import open_seeds, openings
+from kerfwright.refine.segment.openings import disagreement, open_seeds, openings
 from kerfwright.refine.segment.options import BoardOutlines, SegmentOptions
 from kerfwright.refine.segment.rectify import Photos, even_out, rectify
 from kerfwright.refine.segment.scene import OCCLUDED, Occluders
@@ -95,6 +96,11 @@ class _Looks:
     kinds: list[np.ndarray]
     cores: list[np.ndarray]  # seen, and inside for certain
     sides: list[int]
+
+    @cached_property
+    def apart(self) -> np.ndarray:
+        """(rows, cols) disagreement of the photographs, LAB units squared."""
+        return disagreement(self.labs, self.seen, self.sides)
 
 
 def segment_boards(
@@ -180,15 +186,15 @@ def _round(
     if not seeds.inside.any():
         return replace(board, views=[], shifts=[])
     looks = _look(board, seeds, error, occluders, photos)
-    opened = _opened(board, looks, options) if round_idx > 0 else np.zeros(board.grid.shape, bool)
+    opened, drilled = _opened(board, looks, options) if round_idx > 0 else [np.zeros(board.grid.shape, bool)] * 2
     seeds = replace(seeds, inside=seeds.inside | board.walled & ~forbidden)
-    seeds = open_seeds(seeds, opened, board.grid.pixel)
-    evidences, contrasts = _evidence(board, looks, opened, seeds, error, options)
+    seeds = drilled_seeds(open_seeds(seeds, opened, board.grid.pixel), drilled & ~opened, board.grid.pixel)
+    evidences, contrasts = _evidence(board, looks, opened | drilled, seeds, error, options)
     if not evidences:
         return replace(board, views=[], shifts=[])
     weights = smoothness_weights(contrasts, board.crossing, options.smoothness)
     mask = cut(average(evidences, seeds), weights, seeds.inside, seeds.outside)
-    masks = [without_false_holes(m, looks.labs, looks.seen, looks.sides, board.grid.pixel)
+    masks = [without_false_holes(m, looks.labs, looks.seen, looks.apart, board.grid.pixel)
              for m in _own(clean(mask, board.grid.pixel, options), board.rough)]
     if not masks:
         return replace(board, views=[], shifts=[])
@@ -196,9 +202,13 @@ def _round(
     return _registered(board, occluders, photos, options)
 
 
-def _opened(board: _Board, looks: _Looks, options: SegmentOptions) -> np.ndarray:
-    """Openings that the rough outline does not know of; from the second round, when what hides the board is known."""
-    return openings(looks.labs, looks.seen, looks.sides, board.mask, board.face, board.grid, options.refined_error)
+def _opened(board: _Board, looks: _Looks, options: SegmentOptions) -> tuple[np.ndarray, np.ndarray]:
+    """Openings and drilled holes, the rough outline may not know of them; from the second round, when what hides the
+    board is known.
+    """
+    rest = (board.mask, board.face, board.grid)
+    opened = openings(looks.labs, looks.seen, looks.apart, *rest, options.refined_error)
+    return opened, drilled_holes(looks.labs, looks.seen, looks.sides, looks.apart, *rest)
 
 
 def _own(masks: list[np.ndarray], rough: np.ndarray) -> list[np.ndarray]:

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from kerfwright.refine.segment.evidence import grown
-from kerfwright.refine.segment.openings import disagreement
 
 __all__ = ["without_false_holes"]
 
@@ -28,18 +27,18 @@ LEAST_VIEWS = 3
 
 
 def without_false_holes(
-    mask: np.ndarray, labs: Sequence[np.ndarray], seen: Sequence[np.ndarray], sides: Sequence[int], pixel: float
+    mask: np.ndarray, labs: Sequence[np.ndarray], seen: Sequence[np.ndarray], apart: np.ndarray, pixel: float
 ) -> np.ndarray:
     """The mask, (rows, cols) bool, with those holes filled that the photographs show to be wood.
 
-    labs (rows, cols, 3), seen (rows, cols) bool, sides: one a photograph; pixel: mm.
+    labs (rows, cols, 3), seen (rows, cols) bool: one a photograph; apart: their disagreement, LAB units squared;
+    pixel: mm.
     """
     from scipy.ndimage import binary_fill_holes, label
 
     labels, count = label(binary_fill_holes(mask) & ~mask)
     if not count:
         return mask
-    apart = disagreement(labs, seen, sides)
     inner = mask & np.isfinite(apart)
     limit = max(AGREED * float(np.median(apart[inner])), LEAST_AGREED) if inner.any() else 0.0
     filled = mask.copy()

@@ -53,18 +53,18 @@ def disagreement(labs: Sequence[np.ndarray], seen: Sequence[np.ndarray], sides: 
 
 
 def openings(
-    labs: Sequence[np.ndarray], seen: Sequence[np.ndarray], sides: Sequence[int], mask: np.ndarray,
+    labs: Sequence[np.ndarray], seen: Sequence[np.ndarray], apart: np.ndarray, mask: np.ndarray,
     face: np.ndarray, grid: Grid, error: float,
 ) -> np.ndarray:
     """Pixels of the openings inside `mask`, (rows, cols) bool.
 
-    face : (N, 2) points of the cloud on the sheet faces, mm; error : mm that the mask's outline may be off.
+    apart : the disagreement of the photographs, LAB units squared; face : (N, 2) points of the cloud on the sheet
+    faces, mm; error : mm that the mask's outline may be off.
     """
     from scipy.ndimage import binary_fill_holes
 
     none = np.zeros(mask.shape, bool)
     whole = binary_fill_holes(mask)
-    apart = disagreement(labs, seen, sides)
     known = np.isfinite(apart)
     inner = grown(whole, -error, grid.pixel)
     if not (known & inner).any():
