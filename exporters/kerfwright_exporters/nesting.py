@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 __all__ = ["NestOptions", "Place", "nest"]
 
-MOST_MOVES = 40_000  # of all boards together
+MOST_MOVES = 120_000  # of all boards together
 MANY_PARTS = 8  # convex parts a board, from which a move takes so long that fewer are made
 LONG_STEP, SHORT_STEP, SHORTEST_STEP = (
     0.01,
@@ -33,6 +33,7 @@ LONG_STEP, SHORT_STEP, SHORTEST_STEP = (
     0.0002,
 )  # of the length in use, by which the last sheet is cut shorter
 EXPLORING = 0.7  # share of the moves spent on long steps
+FAILURES_A_BOARD = 3  # in a row, after which few boards, whose layouts have all been tried, are left as they are
 DENSEST = 0.97  # share of a sheet that boards with curves and corners hardly fill
 MANY_CORNERS, STRAY = 24, 0.25  # outlines of more corners are drawn with fewer, up to twice so far outside, mm
 
@@ -55,56 +56,56 @@ def nest(outlines: list[Polygon], options: NestOptions) -> list[Place]:
 
 @dataclass
 class _Layout:
-    """Sheet, turn (as an index) and lower left corner of every grown outline, and how long each sheet is."""
+    """Where every grown outline lies, and how long each sheet is.
 
-    sheets: np.ndarray
-    turned: np.ndarray
-    x: np.ndarray
-    y: np.ndarray
+    at : (N, 6) sheet, turn (as an index), left, bottom, right and top; the last two are for `separate` to set
+    """
+
+    at: np.ndarray
     lengths: np.ndarray
 
     def copy(self) -> _Layout:
-        return _Layout(*(value.copy() for value in vars(self).values()))
-
-    @property
-    def arrays(self) -> tuple[np.ndarray, ...]:
-        return self.sheets, self.turned, self.x, self.y
+        return _Layout(self.at.copy(), self.lengths.copy())
 
 
 class _Shapes:
-    """The outlines, grown by half the spacing, as convex parts at every turn, lower left corners at the origin."""
+    """The outlines, grown by half the spacing, as convex parts at every turn, lower left corners at the origin.
+
+    arrays : edges (E, 5), see `_edges`; parts (P, 6) with left, bottom, right, top, first edge and edge after the last;
+        shapes, an outline at a turn each, (N * turns, 4) with length, width, first part and part after the last
+    """
 
     def __init__(self, outlines: list[Polygon], options: NestOptions) -> None:
         self.corners: list[np.ndarray] = []
-        corners, normals, firsts, boxes, parts, sizes = [], [], [0], [], [0], []
+        edges, parts, shapes = [], [], []
         for outline in outlines:
-            pieces = convex_parts(_grown(outline, options.spacing / 2))
+            pieces = sorted(convex_parts(_grown(outline, options.spacing / 2)), key=_area, reverse=True)
             for turn in options.turns:
                 turned = [piece @ _turn(turn).T for piece in pieces]
-                low = np.concatenate(turned).min(axis=0)
+                everything = np.concatenate(turned)
+                low, first = everything.min(axis=0), len(parts)
                 self.corners.append(low)
                 for piece in (piece - low for piece in turned):
-                    along = np.roll(piece, -1, axis=0) - piece
-                    corners.append(piece)
-                    normals.append(np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None])
-                    firsts.append(firsts[-1] + len(piece))
-                    boxes.append([*piece.min(axis=0), *piece.max(axis=0)])
-                parts.append(len(boxes))
-                sizes.append(np.ptp(np.concatenate(turned), axis=0))
-        all_corners, all_normals = np.concatenate(corners), np.concatenate(normals)
-        reach = (all_corners * all_normals).sum(axis=1)
-        starts = np.array(firsts)
-        self.sizes = np.array(sizes)
-        self.arrays = (
-            all_corners,
-            all_normals,
-            reach,
-            starts[:-1],
-            starts[1:],
-            np.array(boxes),
-            np.array(parts),
-            self.sizes,
-        )
+                    start = parts[-1][5] if parts else 0
+                    edges.append(_edges(piece))
+                    parts.append([*piece.min(axis=0), *piece.max(axis=0), start, start + len(piece)])
+                shapes.append([*np.ptp(everything, axis=0), first, len(parts)])
+        self.sizes = np.array(shapes)[:, :2]
+        lines, pieces = np.concatenate(edges), np.array(parts)
+        self.arrays = lines, pieces, np.array(shapes)
+
+
+def _area(piece: np.ndarray) -> float:
+    """Of a convex part; large ones are looked at first, since they show soonest that a place is no good."""
+    x, y = piece.T
+    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+
+
+def _edges(piece: np.ndarray) -> np.ndarray:
+    """(N, 5) of a convex part: the normal outwards of every edge, how far out it lies, and the corner it starts at."""
+    along = np.roll(piece, -1, axis=0) - piece
+    normals = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+    return np.column_stack([normals, (piece * normals).sum(axis=1), piece])
 
 
 def _turn(degrees: int) -> np.ndarray:
@@ -130,7 +131,7 @@ class _Search:
         self.turns = len(options.turns)
         self.full = np.array([options.length, options.width]) + options.spacing
         self.rng = np.random.default_rng(options.seed)
-        parts = len(self.shapes.arrays[5]) / len(self.shapes.sizes)
+        parts = len(self.shapes.arrays[1]) / len(self.shapes.sizes)
         self.moves = int(min(MOST_MOVES, options.moves * len(outlines)) * min(1.0, MANY_PARTS / parts))
 
     def best_places(self) -> list[Place]:
@@ -148,12 +149,12 @@ class _Search:
         x, y = (np.array([p.shift for p in self.first]) + corners + self.options.spacing / 2).T
         sheets = np.array([place.sheet for place in self.first])
         lengths = np.full(sheets.max() + 1, self.full[0])
-        return _Layout(sheets, turned, x.copy(), y.copy(), lengths)
+        return _Layout(np.column_stack([sheets, turned, x, y, x, y]).astype(float), lengths)
 
     def _place(self, layout: _Layout, k: int) -> Place:
-        corner = self.shapes.corners[k * self.turns + layout.turned[k]]
-        shift = np.array([layout.x[k], layout.y[k]]) - corner - self.options.spacing / 2
-        return Place(int(layout.sheets[k]), self.options.turns[layout.turned[k]], (float(shift[0]), float(shift[1])))
+        sheet, turn = layout.at[k, :2].astype(int)
+        shift = layout.at[k, 2:4] - self.shapes.corners[k * self.turns + turn] - self.options.spacing / 2
+        return Place(int(sheet), self.options.turns[turn], (float(shift[0]), float(shift[1])))
 
     def _fewer_sheets(self, best: _Layout) -> _Layout:
         """Without the last sheet, as long as its boards find room on the others."""
@@ -170,7 +171,7 @@ class _Search:
         best.lengths[-1] = self._used(best)
         exploring, step, failures = (1 - EXPLORING) * self.moves, LONG_STEP, 0
         least = self._least_length(best, sizes)
-        while self.moves > 0:
+        while self.moves > 0 and failures < FAILURES_A_BOARD * len(self.areas):
             compressing = self.moves < exploring
             step = min(step, SHORT_STEP) if compressing else step
             goal = best.copy()
@@ -195,9 +196,9 @@ class _Search:
 
     def _used(self, layout: _Layout) -> float:
         """How far boards reach on the last sheet."""
-        index = np.arange(len(self.areas)) * self.turns + layout.turned
-        ends = layout.x + self.shapes.sizes[index, 0]
-        return float(ends[layout.sheets == len(layout.lengths) - 1].max(initial=0.0))
+        index = np.arange(len(self.areas)) * self.turns + layout.at[:, 1].astype(int)
+        ends = layout.at[:, 2] + self.shapes.sizes[index, 0]
+        return float(ends[layout.at[:, 0] == len(layout.lengths) - 1].max(initial=0.0))
 
     def _apart(self, layout: _Layout, moves: int) -> bool:
         """Push all boards onto their sheets and move them until none overlap; the moves are counted."""
@@ -205,7 +206,7 @@ class _Search:
             self.moves -= 1
             return False
         weights = np.ones((len(self.areas), len(self.areas)))
-        on = self.shapes.arrays, self.turns, layout.lengths, self.full[1], layout.arrays
+        on = *self.shapes.arrays, self.turns, layout.lengths, self.full[1], layout.at
         done, left = separate(*on, weights, int(self.rng.integers(1 << 30)), moves)
         self.moves -= max(1, moves - left)
         return bool(done)
@@ -213,10 +214,10 @@ class _Search:
     def _squeeze(self, layout: _Layout) -> bool:
         """Push boards that stand out of their sheets back, or onto others; whether there is a sheet for each."""
         last = len(layout.lengths) - 1
-        for board, (sheet, turn) in enumerate(zip(layout.sheets, layout.turned, strict=True)):
+        for board, (sheet, turn) in enumerate(layout.at[:, :2].astype(int)):
             room = self._room(layout, board, turn, min(sheet, last))
             if sheet <= last and (room >= 0).all():
-                layout.x[board], layout.y[board] = np.clip((layout.x[board], layout.y[board]), 0, room)
+                layout.at[board, 2:4] = np.clip(layout.at[board, 2:4], 0, room)
             elif not self._resettle(layout, board, min(sheet, last)):
                 return False
         return True
@@ -227,8 +228,7 @@ class _Search:
             for turn in self.rng.permutation(self.turns):
                 room = self._room(layout, board, turn, sheet)
                 if (room >= 0).all():
-                    layout.sheets[board], layout.turned[board] = sheet, turn
-                    layout.x[board], layout.y[board] = self.rng.random(2) * room
+                    layout.at[board, :4] = sheet, turn, *(self.rng.random(2) * room)
                     return True
         return False
 
@@ -240,5 +240,4 @@ class _Search:
         """Let two large boards change places."""
         large = np.argsort(-self.areas, kind="stable")[: max(2, len(self.areas) // 3)]
         pair = self.rng.choice(large, 2, replace=False)
-        for values in (layout.sheets, layout.x, layout.y):
-            values[pair] = values[pair[::-1]]
+        layout.at[pair[:, None], (0, 2, 3)] = layout.at[pair[::-1, None], (0, 2, 3)]

@@ -19,7 +19,7 @@ class NestOptions:
     finalists: int = 3  # best orders laid again on the fine raster
     coarse: int = 200  # cells across the width: 6 mm on a sheet of 1220
     fine: int = 400
-    moves: int = 1000  # of a board, on average, while the layout is tightened; 30 boards take some 15 seconds
+    moves: int = 3000  # of a board, on average, while the layout is tightened; 30 boards take some 10 seconds
     seed: int = 0
 
 

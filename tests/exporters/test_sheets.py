@@ -15,7 +15,8 @@ from shapely import affinity
 from kerfwright.errors import ExportError, OptionError
 from kerfwright.model import Model
 from kerfwright.model.geometry import path_area, sample_loop
-from kerfwright_exporters import ExportOptions
+from kerfwright_exporters import ExportOptions, nesting
+from kerfwright_exporters._separation import separate
 from kerfwright_exporters.convex import convex_parts
 from kerfwright_exporters.dimensions import laid_polygon, sheet_dimensions
 from kerfwright_exporters.drawing import upright
@@ -70,6 +71,19 @@ def test_moving_boards_tightens_the_first_layout(seed):
     ends = [max(board.bounds[2] for board in found) for found in (first, tight)]
     assert ends[1] < 0.98 * ends[0]
     assert min(a.distance(b) for a, b in combinations(tight, 2)) >= 6 - 1e-6
+
+
+def test_few_boards_are_left_as_they_are_before_the_moves_are_used_up(monkeypatch):
+    left = []
+
+    def counted(*arguments):
+        done, moves = separate(*arguments)
+        left.append(moves)
+        return done, moves
+
+    monkeypatch.setattr(nesting, "separate", counted)
+    nest(outlines(4, 1), NestOptions(2000, 800, 6.0, layouts=5, coarse=60, fine=100, moves=5000))
+    assert 0 < left[-1] < left[0]
 
 
 def test_a_sheet_that_is_not_needed_is_saved():
