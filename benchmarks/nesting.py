@@ -2,8 +2,9 @@
 
     python benchmarks/nesting.py [--seconds 20] [--seeds 3]
 
-spyrrow gets the same boards, spacing and turns, one thread, and so many seconds; kerfwright itself does not need it:
-pip install spyrrow. Sheets are counted against the area of the boards over the usable area of a sheet, rounded up.
+spyrrow gets the same boards, spacing and turns, one thread, and so many seconds by the clock, of which a loaded
+processor gives it fewer; kerfwright itself does not need it: pip install spyrrow. Sheets are counted against the area
+of the boards over the usable area of a sheet, rounded up.
 """
 
 from __future__ import annotations
@@ -36,7 +37,8 @@ def main() -> None:
     strips = [
         _strip(name, boards, turns, arguments.seconds, arguments.seeds) for name, boards in _sets() for turns in TURNS
     ]
-    head = ["set", "turns", "kerfwright", "processor seconds", f"spyrrow, {arguments.seconds} s", "least distance, mm"]
+    head = ["set", "turns", "kerfwright", "processor seconds", "least distance, mm"]
+    head += [f"spyrrow, {arguments.seconds} s", "processor seconds"]
     print(markdown(head, strips))
     print(
         markdown(
@@ -85,7 +87,7 @@ def _angles():
 
 def _strip(name: str, boards: list, turns: Sequence[int], seconds: int, seeds: int) -> list[str]:
     area = sum(board.area for board in boards)
-    ours, theirs, least, took = [], [], math.inf, []
+    ours, theirs, least, took, spent = [], [], math.inf, [], []
     for seed in range(seeds):
         start = time.process_time()
         places = nest(boards, NestOptions(ENDLESS, WIDTH, SPACING, tuple(turns), seed=seed))
@@ -93,9 +95,13 @@ def _strip(name: str, boards: list, turns: Sequence[int], seconds: int, seeds: i
         laid = _laid(boards, places)
         ours.append(area / WIDTH / max(board.bounds[2] for board in laid))
         least = min(least, *(a.distance(b) for a, b in combinations(laid, 2)))
+        start = time.process_time()
         theirs.append(_spyrrow(boards, turns, seconds, seed))
-    figures = [" ".join(f"{d:.3f}" for d in found) for found in (ours, theirs)]
-    return [name, str(len(turns)), figures[0], f"{np.mean(took):.0f}", figures[1], f"{least:.4f}"]
+        spent.append(time.process_time() - start)
+    columns = [" ".join(form.format(x) for x in found) for found, form in (
+        (ours, "{:.3f}"), (took, "{:.0f}"), ([least], "{:.4f}"), (theirs, "{:.3f}"), (spent, "{:.0f}")
+    )]  # fmt: skip
+    return [name, str(len(turns)), *columns]
 
 
 def _spyrrow(boards: list, turns: Sequence[int], seconds: int, seed: int) -> float:
