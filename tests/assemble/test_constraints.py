@@ -8,7 +8,7 @@ from clouds import pose, sheet, turned
 from kerfwright.assemble import AssembleOptions
 from kerfwright.assemble.constraints import constraint_segments
 from kerfwright.assemble.contacts import Decided
-from kerfwright.assemble.joints import Search, end_on
+from kerfwright.assemble.joints import Joint, Search, end_on, face_plane, trace_of
 from kerfwright.model import ContactEvidence
 
 D = 400.0
@@ -106,3 +106,26 @@ def test_a_traced_foot_ends_where_its_arch_begins():
     )
     assert np.linalg.norm(rough.end - rough.start) > 45
     assert np.linalg.norm(traced.end - traced.start) == pytest.approx(41, abs=2)
+
+
+def corner_with_a_diagonal():
+    """A top, a diagonal that stops in its corner, and what is known of that corner."""
+    n, u = np.array([1, 0, 1]) / np.sqrt(2), np.array([1, 0, -1]) / np.sqrt(2)
+    top = sheet("top", pose((-200, 0, 0), (1, 0, 0), (0, 1, 0)), 16.0, (0, 0, 400, 100))
+    diagonal = sheet("diagonal", pose(np.array([-184, 0, 0]) - 8 * n, u, (0, 1, 0)), 16.0, (3, 0, 250, 100))
+    inner = Joint(1, 0, "top", trace_of(top, *face_plane(diagonal, "top")), ((-100.0, 0.0),), 0.0, np.zeros((0, 2)))
+    return (top, diagonal), Decided(joint((top, diagonal), 0, 1), 2, inner, ContactEvidence())
+
+
+def test_the_board_that_runs_through_at_a_slanted_corner_ends_flush():
+    sheets, corner = corner_with_a_diagonal()
+    (end,) = segments_of(sheets, corner)[0]
+    assert (end.origin, end.normal is not None) == ("corner", True)
+
+
+def test_a_diagonal_within_the_corner_of_a_case_does_not_bevel_its_end():
+    """The case's side stands where the bevel would be."""
+    (top, diagonal), corner = corner_with_a_diagonal()
+    side = sheet("side", pose((-200, 0, -200), (0, 1, 0), (0, 0, 1)), 16.0, (0, 0, 100, 198))
+    sheets = (top, diagonal, side)
+    assert segments_of(sheets, corner, Decided(joint(sheets, 0, 2), 1, None, ContactEvidence()))[0] == ()

@@ -14,6 +14,7 @@ from kerfwright.evaluate.nodes import loop_nodes, true_nodes
 from kerfwright.evaluate.rough import rough_figures
 from kerfwright.evaluate.surfaces import Body, occupied_share, sample_surface
 from kerfwright.evaluate.touching import touching_pairs
+from kerfwright.evaluate.truth import TrueBoard
 from kerfwright.model import Model
 from kerfwright.model.frames import rows
 from kerfwright.model.io import write_model
@@ -165,6 +166,22 @@ def test_nodes_of_the_truth_are_those_of_its_model(family, tmp_path):
         parts = [loop_nodes(loop) for loop in (board.cut_path.outer, *board.cut_path.holes)]
         assert np.allclose(at, np.concatenate([p[0] for p in parts]))
         assert np.array_equal(smooth, np.concatenate([p[1] for p in parts])), board.name
+
+
+def test_nodes_of_a_bevelled_end_are_where_it_reaches_furthest():
+    """Whether the truth's outline is that, or the one half way through the board."""
+    low, high = ([(0, 0, z), (x, 0, z), (x, 50, z), (0, 50, z)] for x, z in ((108, 0), (92, 16)))
+    corners = np.array([*low, *high], float)
+    faces = [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]]
+    triangles = np.array([t for a, b, c, d in faces for t in ((a, b, c), (a, c, d))])
+    for end in (100.0, 108.0):
+        ring = np.array([(0, 0), (end, 0), (end, 50), (0, 50)], float)
+        edges = [
+            {"kind": "line", "start": a, "end": b, "length": float(np.linalg.norm(b - a))}
+            for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)
+        ]
+        board = TrueBoard("a", 16.0, np.eye(4), corners, triangles, ({"hole": False, "edges": edges},))
+        assert np.allclose(true_nodes(board)[0], [[0, 0], [108, 0], [108, 50], [0, 50]], atol=0.01)
 
 
 def test_folders_are_read_and_bad_ones_refused(tiny, tmp_path):

@@ -39,6 +39,13 @@ def test_a_traced_rectangle_becomes_four_lines_that_end_on_their_segment():
     assert refined.findings == ()
 
 
+def test_a_spur_that_was_traced_along_the_board_it_ends_on_is_left_out():
+    """4 mm wide, where the other board's shadow begins."""
+    spur = Polygon([(195, 110), (200, 110), (204, 114), (204, 118), (195, 118)])
+    (board,) = finished(box(0, 0, 200, 118).union(spur), TOP_EDGE).boards
+    assert sorted(edge_length(e) for e in board.cut_path.outer.edges) == pytest.approx([120, 120, 200, 200], abs=0.5)
+
+
 def test_a_boundary_that_cannot_be_fitted_becomes_a_polygon_and_says_so(monkeypatch):
     def fails(loops, segments, options):
         raise StageError("curves: too rough")

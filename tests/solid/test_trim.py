@@ -10,7 +10,7 @@ from kerfwright.model.clip import ConvexArea, clipped_loop
 from kerfwright.model.frames import invert, model_from_board, rows
 from kerfwright.model.geometry import edge_length, edge_points, loop_distance, reverse_edge, signed_area
 from kerfwright.model.pieces import edge_piece
-from kerfwright.model.slits import without_slits
+from kerfwright.model.slits import without_idle_nodes, without_slits
 from kerfwright.solid import assembly_solids, check
 from kerfwright.solid.faces import shape_of
 from kerfwright.solid.interference import common_volume
@@ -158,3 +158,25 @@ def test_slits_are_bridged():
 
 def _turned_round(edges: list) -> list:
     return [reverse_edge(e) for e in reversed(edges)]
+
+
+def test_lines_that_a_cut_has_parted_are_one_again():
+    """A sliver of nothing, and a node in the middle of an edge; a corner of a tenth of a millimetre stays."""
+    points = [(0, 0), (60, 0), (60, 0.0002), (100, 0), (100, 50), (50, 50.1), (0, 50)]
+    edges = tuple(Line(start=a, end=b) for a, b in pairwise([*points, points[0]]))
+    loop = without_idle_nodes(Loop(edges=edges), 1e-3)
+    assert [e.start for e in loop.edges] == [(0, 0), (100, 0), (100, 50), (50, 50.1), (0, 50)]
+    assert without_idle_nodes(loop, 1e-3) is loop
+
+
+def test_an_edge_beside_a_shorter_board_is_moved_as_a_whole():
+    """Boards glued edge to edge, .004 mm in each other, one .3 mm longer: no step of .004 mm at its end."""
+    first = board(rectangle(400, 100), "first")
+    second = board(rectangle(399.7, 100.004), "second", pose=placed(at=(0, -100, 0)))
+    seam = Contact(
+        type=3, a="first", b="second", face_a="edge", face_b="edge", point=(200, 0, 8), normal=(0, -1, 0),
+        interface=(((0, 0, 0), (399.7, 0, 0), (399.7, 0, 16), (0, 0, 16)),), area=399.7 * 16, angle=0,
+    )  # fmt: skip
+    trimmed = fitted_together(Model(boards=(first, second), contacts=(seam,)))
+    assert overlap(trimmed) == pytest.approx(0, abs=1e-6)
+    assert [len(b.cut_path.outer.edges) for b in trimmed.boards] == [4, 4]

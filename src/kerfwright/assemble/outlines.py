@@ -5,15 +5,18 @@ Boundaries near a contact are dark or hidden and traced badly; what is known the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
 from kerfwright.assemble.types import ConstraintSegment
 
-__all__ = ["constrained_region", "filled_region", "largest_piece", "segment_axes"]
+__all__ = ["constrained_region", "filled_region", "largest_piece", "on_segments", "segment_axes"]
 
 CRACK = 0.01  # mm
+ON_SEGMENT = 0.05  # mm; boundaries lie on their segments to rounding
 SHALLOW = 0.12  # of the reach: how much deeper than usual a column may be and still be filled
 TRACED_SHALLOW = 0.03  # ... of a traced outline above the floor: an arch begins there, which photographs show
 
@@ -55,6 +58,16 @@ def segment_axes(segment: ConstraintSegment) -> tuple[np.ndarray, np.ndarray, fl
     length = float(np.linalg.norm(along))
     along = along / length
     return along, np.array([-along[1], along[0]]), length
+
+
+def on_segments(points: np.ndarray, segments: Sequence[ConstraintSegment]) -> np.ndarray:
+    """(N,) whether points lie on a segment."""
+    on = np.zeros(len(points), bool)
+    for segment in segments:
+        along, inward, length = segment_axes(segment)
+        x = points - segment.start
+        on |= (np.abs(x @ inward) < ON_SEGMENT) & (x @ along > -ON_SEGMENT) & (x @ along < length + ON_SEGMENT)
+    return on
 
 
 def _strip(segment: ConstraintSegment, low: float, high: float, widen: float) -> Polygon:

@@ -17,6 +17,7 @@ __all__ = ["NodeCount", "compare_nodes", "loop_nodes", "true_nodes"]
 
 REACH = 2.0  # mm within which a node is found
 SMOOTH = np.radians(15.0)  # a turn below this is smooth: what polylines of small arcs turn by over a millimetre
+INSIDE = 0.3  # mm from the shadow's corner beyond which a node is one of a bevel
 PROBE = 1.0  # mm along the outline on either side of a true node, where its turn is read
 
 
@@ -41,16 +42,29 @@ def loop_nodes(loop: Loop) -> tuple[np.ndarray, np.ndarray]:
 
 
 def true_nodes(board: TrueBoard) -> tuple[np.ndarray, np.ndarray]:
-    """The same of a true board; where curves meet, the turn is read off its mesh's outline."""
+    """The same of a true board; where curves meet, the turn is read off its mesh's outline. Those of a bevelled end are
+    where the board reaches furthest, as in a model's cut path: some truths have them half way through the board.
+    """
     rings = _outline(board)
-    at, smooth = [], []
+    at, smooth, corner = [], [], []
     for loop in board.loops:
         edges = loop["edges"]
         for before, edge in zip([edges[-1], *edges[:-1]], edges, strict=True):
             if len(edges) > 1:
                 at.append(edge["start"])
                 smooth.append(_is_smooth(before, edge, rings))
+                corner.append(not smooth[-1] and before["kind"] == edge["kind"] == "line")
+    at = [_furthest(np.array(p, float), rings, board.thickness) if c else p for p, c in zip(at, corner, strict=True)]
     return np.array(at, float).reshape(-1, 2), np.array(smooth, bool)
+
+
+def _furthest(node: np.ndarray, rings, thickness: float) -> np.ndarray:
+    """The corner of the board's shadow that belongs to a corner of two lines."""
+    import shapely
+
+    corners = np.concatenate([shapely.get_coordinates(ring.simplify(INSIDE)) for ring in rings])
+    distance = np.linalg.norm(corners - node, axis=1)
+    return corners[distance.argmin()] if INSIDE < distance.min() < 2 * thickness else node
 
 
 def _is_smooth(before: dict, edge: dict, rings) -> bool:

@@ -8,7 +8,7 @@ from kerfwright.model.cutpath import Circle, Edge, Line, Loop
 from kerfwright.model.geometry import edge_points, edge_tangents
 from kerfwright.model.pieces import edge_piece
 
-__all__ = ["without_slits"]
+__all__ = ["without_idle_nodes", "without_slits"]
 
 BACK = np.radians(175)  # turn from which an outline doubles back: no board has a corner of five degrees
 _PROBES = np.linspace(0, 1, 513)
@@ -33,6 +33,34 @@ def without_slits(loop: Loop, width: float) -> Loop:
             edges.insert(k + 1, bridge)
             return without_slits(Loop(edges=tuple(edges)), width)
     return loop
+
+
+def without_idle_nodes(loop: Loop, within: float) -> Loop:
+    """The loop with lines that are one to `within` mm as one, with the longer one's provenance."""
+    edges = list(loop.edges)
+    k = 0
+    while k < len(edges) and len(edges) > 3:
+        joined = _one_line(edges[k - 1], edges[k], within)
+        if joined is None:
+            k += 1
+        else:
+            edges[k - 1] = joined
+            del edges[k]
+            k = max(k - 1, 0)
+    return Loop(edges=tuple(edges)) if len(edges) < len(loop.edges) else loop
+
+
+def _one_line(edge: Edge, after: Edge, within: float) -> Line | None:
+    """Both lines as one; None where the node between them is a corner, or either is none."""
+    if not (isinstance(edge, Line) and isinstance(after, Line)):
+        return None
+    a, node, b = (np.array(p) for p in (edge.start, edge.end, after.end))
+    length = float(np.linalg.norm(b - a))
+    longer = max((edge, after), key=lambda e: np.linalg.norm(np.subtract(e.end, e.start)))
+    if length < float(np.linalg.norm(np.subtract(longer.end, longer.start))) - within:
+        return None  # it turns back
+    off = abs((b - a)[0] * (node - a)[1] - (b - a)[1] * (node - a)[0]) / max(length, within)
+    return longer.model_copy(update={"start": edge.start, "end": after.end}) if off < within else None
 
 
 def _doubles_back(edge: Edge, after: Edge) -> bool:

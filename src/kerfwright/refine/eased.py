@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import binary_closing, binary_opening, uniform_filter1d
 
-from kerfwright.assemble.outlines import segment_axes
+from kerfwright.assemble.outlines import on_segments
 from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.types import Sheet
@@ -32,22 +32,24 @@ WINDOW = 1 / 125  # of D, along the boundary to both sides, whose points speak f
 LEAST_IN_WINDOW = 12
 SIGMAS = 3.0  # times the cloud's noise by which a board must lie inside, in the median of its places
 LEAST_SHARE = 0.08  # of a boundary that must have points to tell of the rest
-ON_SEGMENT = 0.05  # mm; what lies on a constraint segment stays there
+BITE_SIGMAS = 4.0  # by which a place must lie inside that was traced wrongly, its board being sharp-edged
+LASTING = 1 / 50  # of D: shortest stretch of such places
 LARGEST = 1 / 8  # of the thickness; arrises are not rounded over by more
 UNSEEN_ERROR = 0.3  # of the easing, where no points tell
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stereo:
     """How far the cloud's points lie outside the faces that they were seen on, and how they scatter; mm."""
 
     bias: float
     noise: float
+    on_faces: np.ndarray  # indices of the points on sheet planes: a thin board on an edge has its face where that ends
 
 
 def stereo_of(sheets: Sequence[Sheet], cloud: Cloud) -> Stereo:
     """What the points of the sheet planes say of the cloud."""
-    faces = []
+    faces, on_faces = [], np.unique(np.concatenate([np.r_[s.top_idx, s.bottom_idx] for s in sheets]))
     for sheet in sheets:
         for idx, base, sign in ((sheet.top_idx, sheet.thickness.value, 1), (sheet.bottom_idx, 0.0, -1)):
             if len(idx) >= LEAST_POINTS:
@@ -55,9 +57,9 @@ def stereo_of(sheets: Sequence[Sheet], cloud: Cloud) -> Stereo:
                 middle = np.median(outside)
                 faces.append((middle, 1.4826 * np.median(np.abs(outside - middle))))
     if not faces:
-        return Stereo(0.0, np.inf)
+        return Stereo(0.0, np.inf, on_faces)
     bias, noise = np.array(faces).T
-    return Stereo(float(np.median(bias)), float(np.quantile(noise, WELL_SEEN)))
+    return Stereo(float(np.median(bias)), float(np.quantile(noise, WELL_SEEN)), on_faces)
 
 
 def moved_to_cut_faces(
@@ -66,35 +68,54 @@ def moved_to_cut_faces(
     """The loops of a board, moved outward where cut-face points lie clearly beyond them; none on constraint segments.
     """
     contour = contour_of(loops)
-    across, vertex = _cut_points(contour, sheet, cloud)
+    across, vertex = _cut_points(contour, sheet, cloud, stereo.on_faces)
     told, told_error = _told(contour, across - stereo.bias, vertex, stereo.noise, cloud.diameter)
-    free = ~_on_segments(contour.points, segments)
+    free = ~on_segments(contour.points, segments)
+    bitten = _lasting(free & (told > BITE_SIGMAS * told_error), contour, cloud.diameter)
     most = LARGEST * sheet.thickness.value
-    offset, error = _offsets(told, np.hypot(told_error, contour.error), free, stereo.noise, most)
+    offset, error = _offsets(told, np.hypot(told_error, contour.error), free, stereo.noise, most, bitten)
     offset, error = np.where(free, offset, 0.0), np.where(free, np.hypot(error, contour.error), contour.error)
     return _moved(loops, contour, offset, error, cloud.diameter) if offset.any() else loops
 
 
 def _offsets(
-    told: np.ndarray, error: np.ndarray, free: np.ndarray, noise: float, most: float
+    told: np.ndarray, error: np.ndarray, free: np.ndarray, noise: float, most: float,
+    bitten: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """(N,) by how much each vertex is to move outward, and the error that this adds. A board that lies inside by more
-    than `most` is not eased but was traced wrongly, which says nothing of places without points.
+    than `most` is not eased but was traced wrongly, which says nothing of places without points; nor do bites.
     """
     known = free & np.isfinite(error)
     easing = float(np.median(told[known])) if known.mean() > LEAST_SHARE else 0.0
     if not SIGMAS * noise < easing < most:
-        return np.zeros(len(told)), np.zeros(len(told))
+        return np.where(bitten, np.maximum(told, 0.0), 0.0), np.where(bitten, np.minimum(error, told), 0.0)
     clear = known & (error < easing)
     return np.where(clear, np.maximum(told, 0.0), easing), np.where(clear, error / 2, UNSEEN_ERROR * easing)
 
 
-def _cut_points(contour: Contour, sheet: Sheet, cloud: Cloud) -> tuple[np.ndarray, np.ndarray]:
+def _lasting(flags: np.ndarray, contour: Contour, diameter: float) -> np.ndarray:
+    """Stretches of flags at least LASTING long, their gaps closed."""
+    out = np.zeros(len(flags), bool)
+    for number in np.unique(contour.loop):
+        mine = np.flatnonzero(contour.loop == number)
+        width = max(3, round(LASTING * diameter / _spacing(contour.points[mine])))
+        wide = np.pad(flags[mine], 2 * width, mode="wrap")
+        out[mine] = binary_opening(binary_closing(wide, np.ones(width)), np.ones(width))[2 * width : -2 * width]
+    return out
+
+
+def _spacing(points: np.ndarray) -> float:
+    return max(float(np.median(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1))), 1e-9)
+
+
+def _cut_points(
+    contour: Contour, sheet: Sheet, cloud: Cloud, on_faces: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Signed distances outside the boundary of points on the board's cut faces, and the vertex that each is nearest to.
     """
     x = sheet.to_board(cloud.points)
     low, high = np.array(MIDDLE) * sheet.thickness.value
-    at = np.flatnonzero((x[:, 2] > low) & (x[:, 2] < high))
+    at = np.setdiff1d(np.flatnonzero((x[:, 2] > low) & (x[:, 2] < high)), on_faces, assume_unique=True)
     across, normal, vertex = contour.across(x[at, :2])
     facing = np.einsum("ij,ij->i", (cloud.normals[at] @ sheet.world_from_board[:3, :3])[:, :2], normal)
     true = np.linalg.norm(contour.points[vertex] - x[at, :2], axis=1)
@@ -113,8 +134,7 @@ def _told(
     across, vertex = across[order], vertex[order]
     for number in np.unique(contour.loop):
         mine = np.flatnonzero(contour.loop == number)
-        spacing = np.median(np.linalg.norm(contour.points[contour.after[mine]] - contour.points[mine], axis=1))
-        reach = max(1, round(WINDOW * diameter / max(spacing, 1e-9)))
+        reach = max(1, round(WINDOW * diameter / _spacing(contour.points[mine])))
         for i in mine:
             window = mine[0] + (i - mine[0] + np.arange(-reach, reach + 1)) % len(mine)
             near = _values(across, vertex, window)
@@ -130,15 +150,6 @@ def _values(across: np.ndarray, vertex: np.ndarray, window: np.ndarray) -> np.nd
     return np.concatenate([across[a:b] for a, b in zip(first, last, strict=True)])
 
 
-def _on_segments(points: np.ndarray, segments: Sequence[ConstraintSegment]) -> np.ndarray:
-    on = np.zeros(len(points), bool)
-    for segment in segments:
-        along, inward, length = segment_axes(segment)
-        x = points - segment.start
-        on |= (np.abs(x @ inward) < ON_SEGMENT) & (x @ along > -ON_SEGMENT) & (x @ along < length + ON_SEGMENT)
-    return on
-
-
 def _moved(
     loops: tuple[BoundaryLoop, ...], contour: Contour, offset: np.ndarray, error: np.ndarray, diameter: float
 ) -> tuple[BoundaryLoop, ...]:
@@ -148,8 +159,7 @@ def _moved(
         mine = contour.loop == number
         tangent = loop.points[(np.arange(len(loop.points)) + 1) % len(loop.points)] - np.roll(loop.points, 1, axis=0)
         tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-12)
-        spacing = np.median(np.linalg.norm(np.roll(loop.points, -1, axis=0) - loop.points, axis=1))
-        width = 2 * max(1, round(WINDOW * diameter / 2 / max(spacing, 1e-9))) + 1
+        width = 2 * max(1, round(WINDOW * diameter / 2 / _spacing(loop.points))) + 1
         by = np.where(offset[mine] > 0, uniform_filter1d(offset[mine], width, mode="wrap"), 0.0)
         points = loop.points + by[:, None] * np.column_stack([tangent[:, 1], -tangent[:, 0]])
         out.append(replace(loop, points=points, standard_error=error[mine]))

@@ -21,6 +21,7 @@ from kerfwright.refine.eased import Stereo, moved_to_cut_faces, stereo_of
 from kerfwright.refine.options import Refined, RefineOptions
 from kerfwright.refine.twins import with_twins
 from kerfwright.refine.types import Fitted, Outline
+from kerfwright.refine.unsure import less_sure_at_contacts
 
 __all__ = ["finished"]
 
@@ -54,6 +55,7 @@ def _fitted(
     problem = ""
     for shape, remarks in attempts:
         loops = moved_to_cut_faces(to_loops(shape, outline, segments, step), sheet, segments, cloud, stereo)
+        loops = less_sure_at_contacts(loops, number, assembly, diameter)
         try:
             fit = fit_curves(loops, segments, curves)
             _refuse_short_edges(fit.path)

@@ -1,9 +1,9 @@
 """Boards trimmed to each other: what a fitted outline runs into a neighbour is cut off, and contacts are measured.
 
 Fits leave slits where an outline doubles back on itself, and outlines hundredths of a millimetre inside the boards
-beside them. Where a board ends on another's sheet, the whole edge is put on that sheet; elsewhere only what lies in the
-neighbour goes. A board that ends on one sheet only is then moved onto it, within its own plane. Deeper overlaps are no
-slip of a fit and are left for the checker to report.
+beside them. Where a board ends on another's sheet, or on its edge, the whole edge is put there; elsewhere only what
+lies in the neighbour goes. A board that ends on one sheet only is then moved onto it, within its own plane. Deeper
+overlaps are no slip of a fit and are left for the checker to report.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from kerfwright.model import Board, Contact, CutPath, Line, Loop, Model
 from kerfwright.model.clip import ConvexArea, clipped_loop
 from kerfwright.model.frames import board_from_model, model_from_board, rows, transform_points
 from kerfwright.model.geometry import edge_points, sample_loop, transform_path
-from kerfwright.model.slits import without_slits
+from kerfwright.model.slits import without_idle_nodes, without_slits
 from kerfwright.solid.build import board_solid, location
 from kerfwright.solid.contacts import interface_polygons, meet
 from kerfwright.solid.faces import FlatFace, Shape, shape_of
@@ -146,8 +146,10 @@ def _trimmed(
     pieces = [shape_of(own.name, solid) for solid in shared.solids()]
     for area in _areas(board, other, pieces, contact, options):
         loop = clipped_loop(board.cut_path.outer, area)
-        if loop is not None and _is_sound(_with_outline(board, loop)):
-            return _family(boards, board, loop)
+        if loop is not None:
+            loop = without_idle_nodes(loop, options.touch)
+            if _is_sound(_with_outline(board, loop)):
+                return _family(boards, board, loop)
     return None
 
 
@@ -193,9 +195,11 @@ def _motion_onto(edge: np.ndarray, normal: np.ndarray, offset: float) -> np.ndar
 def _sheet_lines(
     board: Board, other: Shape, contact: Contact, options: TrimOptions
 ) -> Iterator[tuple[np.ndarray, float]]:
-    """The faces of the other board on which this one ends, as lines in its own plane."""
+    """The faces of the other board on which this one ends, as lines in its own plane; at a seam either may yield."""
     for face in other.faces:
-        if face.normal @ np.array(contact.normal) > np.cos(np.radians(options.tilt)) and (line := _line(board, face)):
+        along = float(face.normal @ np.array(contact.normal))
+        along = along if contact.type in ENDING else abs(along)
+        if along > np.cos(np.radians(options.tilt)) and (line := _line(board, face)):
             yield line
 
 
@@ -228,8 +232,8 @@ def _family(boards: dict[str, Board], board: Board, loop: Loop) -> dict[str, Boa
 def _areas(
     board: Board, other: Shape, shared: list[Shape], contact: Contact | None, options: TrimOptions
 ) -> Iterator[ConvexArea]:
-    """What to take off the board: all beyond the sheet that it ends on, or only what lies in the other."""
-    if contact is not None and contact.type in ENDING:
+    """What to take off the board: all beyond the face that it ends on, or only what lies in the other."""
+    if contact is not None:
         outline = sample_loop(board.cut_path.outer)
         for line in _sheet_lines(board, other, contact, options):
             for end in _ends(board, *line, options):
