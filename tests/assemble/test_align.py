@@ -1,5 +1,7 @@
 """Boards whose points say almost, but not quite, that they are square."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -104,3 +106,15 @@ def test_same_boards_give_the_same_bytes():
     sheets, cloud = boards(Z, at(turned("y", 90.2), 0, 0, 300))
     first, second = (align_sheets(sheets, cloud, OPTIONS)[0] for _ in range(2))
     assert [s.world_from_board.tobytes() for s in first] == [s.world_from_board.tobytes() for s in second]
+
+
+def test_a_few_points_of_the_other_side_move_no_board():
+    """Thickness or points of a hardly seen underside may be wrong; the top is where its many points are."""
+    (board,), cloud = boards(Z)
+    rng = np.random.default_rng(7)
+    stray = np.c_[rng.uniform(0, 300, (40, 2)), np.full(40, -1.0) + 0.1 * rng.standard_normal(40)]
+    cloud = Cloud(np.r_[cloud.points, stray], np.r_[cloud.normals, np.tile([0, 0, -1.0], (40, 1))])
+    board = replace(board, bottom_idx=len(cloud.points) - 40 + np.arange(40))
+    (aligned,), _ = align_sheets((board,), cloud, OPTIONS)
+    tops = aligned.to_board(cloud.points[board.top_idx])[:, 2]
+    assert np.median(tops) == pytest.approx(18.0, abs=0.2)

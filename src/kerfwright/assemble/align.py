@@ -170,20 +170,20 @@ def _moved(sheet: Sheet, evidence: PlaneEvidence, direction: np.ndarray, cloud: 
 
 
 def _offset(sheet: Sheet, evidence: PlaneEvidence, normal: np.ndarray, cloud: Cloud) -> float:
-    """Offset of the top sheet plane along the normal: the side with the lesser noise decides, the other where it is
-    alone.
+    """Offset of the top sheet plane along the normal, both sides by their points and their noise: a few points of the
+    other side move nothing, however near to each other they lie.
     """
-    found = []
+    found, weights = [], []
     for idx, sign in ((sheet.top_idx, 0.0), (sheet.bottom_idx, 1.0)):
         if len(idx) >= 30:
             z = cloud.points[idx] @ normal
             middle = float(np.median(z))
             spread = 1.4826 * float(np.median(np.abs(z - middle)))
-            found.append((middle + sign * sheet.thickness.value, spread))
+            found.append(middle + sign * sheet.thickness.value)
+            weights.append(len(idx) / spread**2)
     if not found:
         return float(evidence.centre @ normal)
-    weights = np.array([spread**-2 for _, spread in found])
-    return float(np.average([value for value, _ in found], weights=weights))
+    return float(np.average(found, weights=weights))
 
 
 def _rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
