@@ -7,7 +7,7 @@ from shapely.geometry import Polygon
 from clouds import pose, sheet, turned
 from kerfwright.assemble import AssembleOptions
 from kerfwright.assemble.constraints import constraint_segments
-from kerfwright.assemble.contacts import Decided
+from kerfwright.assemble.decided import Decided
 from kerfwright.assemble.joints import Joint, Search, end_on, face_plane, trace_of
 from kerfwright.model import ContactEvidence
 

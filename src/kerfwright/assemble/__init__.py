@@ -11,7 +11,7 @@ from kerfwright.capture.types import Capture, Cloud
 from kerfwright.identify.types import Parts, Sheet
 
 if TYPE_CHECKING:
-    from kerfwright.assemble.contacts import Decided
+    from kerfwright.assemble.decided import Decided
     from kerfwright.identify.freespace import FreeSpace
     from kerfwright.identify.photo_edges import Photos
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kerfwright.assemble.contacts import Decided
+from kerfwright.assemble.decided import Decided
 from kerfwright.assemble.joints import Joint, Trace, columns, face_plane, runs_of, trace_of
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.assemble.types import ConstraintSegment

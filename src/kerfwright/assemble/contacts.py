@@ -10,11 +10,13 @@ import numpy as np
 import shapely
 from scipy.spatial import cKDTree
 
+from kerfwright.assemble.decided import Decided, swapped
 from kerfwright.assemble.flush_ends import flush_end
 from kerfwright.assemble.joints import Joint, Search, end_on, face_plane
 from kerfwright.assemble.mitres import EndFace, corner_lines, look_for_mitre, mitred, overlapping
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.assemble.seams import End, Seam, look_for_end, look_for_seam
+from kerfwright.assemble.severing import without_severing
 from kerfwright.assemble.visibility import Obstacles
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.freespace import FreeSpace
@@ -22,7 +24,7 @@ from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.types import Sheet
 from kerfwright.model import Contact, ContactEvidence
 
-__all__ = ["Decided", "find_contacts", "to_contact"]
+__all__ = ["find_contacts", "to_contact"]
 
 LEAST_SEAM = 1.35  # a visible seam is at least this much stronger than the face beside it
 AS_CLEAR = 0.8  # of the score of the edge at the plane
@@ -34,20 +36,6 @@ OPEN_SEAM = 1.8  # below this the seam of a butt joint does not rule out that a 
 LEAST_MITRE = 1.7  # strength of a mitre's seam on an end face; butt joints show up to 1.6 there
 MITRE_MARGIN = 1.3  # ... over the seams of butt joints
 MITRE_VIEWS = 6  # an end face is small: fewer photographs of it say nothing
-
-
-@dataclass(frozen=True, eq=False)
-class Decided:
-    """A contact as decided: b ends on a; for a corner also the joint that was not chosen; for a mitre both joints,
-    on its plane.
-    """
-
-    joint: Joint
-    kind: int  # contact type, 1, 2 or 4
-    other: Joint | None
-    evidence: ContactEvidence
-    mitre: EndFace | None = None  # what its end faces show; None where it cannot be a mitre
-    flush: Joint | None = None  # where a is bevelled flush with b's outer face
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +89,8 @@ def find_contacts(
             else:
                 seen = [d for key in keys if (d := _confirmed(scene, far.get(key)))]
                 found.extend(sorted(seen, key=lambda d: -d.evidence.seam_score)[:1])
-    return [_with_flush_end(scene, d) for d in _like_their_twins(scene, found)]
+    found = without_severing(sheets, _like_their_twins(scene, found))
+    return [_with_flush_end(scene, d) for d in found]
 
 
 def _with_flush_end(scene: _Scene, d: Decided) -> Decided:
@@ -325,7 +314,7 @@ def _like_their_twins(scene: _Scene, found: list[Decided]) -> list[Decided]:
         elif d.kind == 2 and d.evidence.decided_by == "default":
             votes = [sum(_alike(scene, j, c.joint) for c in butts) for j in (d.joint, d.other)]
             if votes[0] < votes[1]:
-                d = replace(d, joint=d.other, other=d.joint, evidence=_swapped(d.evidence))
+                d = replace(d, joint=d.other, other=d.joint, evidence=swapped(d.evidence))
         out.append(d)
     return out
 
@@ -337,10 +326,6 @@ def _votes(scene: _Scene, corner: Decided, others: list[Decided]) -> int:
 
 def _alike_either_way(scene: _Scene, one: Decided, other: Decided) -> bool:
     return any(_alike(scene, joint, other.joint) for joint in (one.joint, one.other))
-
-
-def _swapped(e: ContactEvidence) -> ContactEvidence:
-    return e.model_copy(update={"seam_score": e.seam_score_other, "seam_score_other": e.seam_score})
 
 
 def _alike(scene: _Scene, one: Joint, other: Joint) -> int:

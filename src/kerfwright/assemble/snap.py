@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kerfwright.assemble.contacts import Decided
+from kerfwright.assemble.decided import Decided
 from kerfwright.assemble.flush_ends import flush_trace
 from kerfwright.assemble.joints import Joint, face_plane, trace_of
 from kerfwright.assemble.mitres import mitred

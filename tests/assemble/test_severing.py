@@ -1,0 +1,52 @@
+"""A side, a bottom that ends on it, and a diagonal that runs into the corner of both."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from clouds import pose, sheet
+from kerfwright.assemble.decided import Decided
+from kerfwright.assemble.joints import Search, end_on
+from kerfwright.assemble.severing import severed_share, without_severing
+from kerfwright.model import ContactEvidence
+
+T = 20.0
+SLANT = np.array([1.0, 0, 1]) / np.sqrt(2)
+SIDE = sheet("side", pose((0, 0, 0), (0, 0, 1), (0, 1, 0)), T, (0, 0, 400, 100))  # its inner face is x = 0
+BOTTOM = sheet("bottom", pose((0, 0, 0), (1, 0, 0), (0, 1, 0)), T, (0, 0, 400, 100))
+DIAGONAL = sheet("diagonal", pose((0, 0, T), SLANT, (0, 1, 0)), 16.0, (0, 0, 300, 100))
+SHEETS = (SIDE, BOTTOM, DIAGONAL)
+SEARCH = Search(reach=10.0, slack=5.0, cover=25.0, step=1.5, shortest=3.0)
+
+
+def joint(a: int, b: int):
+    return end_on(SHEETS, a, b, SEARCH)
+
+
+def corner(a: int, b: int, decided_by: str = "default") -> Decided:
+    evidence = ContactEvidence(seam_score=1.2, seam_score_other=1.1, decided_by=decided_by)
+    return Decided(joint(a, b), 2, joint(b, a), evidence)
+
+
+STANDS = Decided(joint(0, 1), 1, None, ContactEvidence())
+
+
+def test_the_side_does_not_end_on_the_diagonal_where_the_bottom_ends_on_it() -> None:
+    assert SIDE.to_world(np.array([[0, 0, T]]))[0, 0] in (T, -T)
+    assert severed_share(SHEETS, joint(2, 0), STANDS.joint) > 0.5
+    assert severed_share(SHEETS, joint(0, 2), STANDS.joint) == 0
+    (kept, turned) = without_severing(SHEETS, [STANDS, corner(2, 0)])
+    assert kept is STANDS
+    assert (turned.joint.a, turned.joint.b) == (0, 2)
+    assert (turned.evidence.decided_by, turned.evidence.seam_score) == ("geometry", 1.1)
+
+
+def test_a_corner_that_severs_nothing_stays_as_the_photographs_decided() -> None:
+    right = corner(0, 2, "seam")
+    assert without_severing(SHEETS, [STANDS, right])[1] is right
+
+
+def test_a_square_corner_by_default_does_not_turn_one_decided_by_a_seam() -> None:
+    unsure = replace(STANDS, kind=2, other=STANDS.joint, evidence=ContactEvidence(decided_by="default"))
+    clear = corner(2, 0, "seam")
+    assert without_severing(SHEETS, [unsure, clear])[1] is clear
