@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter
 
 from clouds import sheet
 from kerfwright.assemble.discontinuity import discontinuity
-from kerfwright.assemble.splits import LEAST_STRENGTH, find_seam_lines
+from kerfwright.assemble.splits import LEAST_STRENGTH, SeamSearch, find_seam_lines
 from kerfwright.assemble.texture import FaceStrips, face_strips
 
 OFFSETS, MIDDLES, SEAM = np.arange(300) * 0.5, np.arange(60) * 6.0, 140
@@ -114,9 +114,9 @@ def test_a_board_of_two_is_split_where_they_meet_and_a_whole_one_is_not():
     def glued(x, y):
         return np.where(y < 70, wood(x, y), wood(x + 500, y + 321) * 0.93)
 
-    found = find_seam_lines(BOARD, [], made_photos(glued), Nothing(), 500.0)
+    found = find_seam_lines(SeamSearch(BOARD, [], made_photos(glued), Nothing(), 500.0))
     assert [s.offset * s.m[1] for s in found] == [pytest.approx(70, abs=1.0)]
-    assert not find_seam_lines(BOARD, [], made_photos(wood), Nothing(), 500.0)
+    assert not find_seam_lines(SeamSearch(BOARD, [], made_photos(wood), Nothing(), 500.0))
 
 
 def test_lines_in_which_another_board_stands_are_no_seams():
@@ -125,4 +125,4 @@ def test_lines_in_which_another_board_stands_are_no_seams():
 
     shelf = sheet("shelf", np.eye(4)[[0, 2, 1, 3]] * [[1], [-1], [1], [1]], 18.0, (0, 18, 360, 200))
     shelf.world_from_board[:3, 3] = 0, 70, 0
-    assert not find_seam_lines(BOARD, [shelf], made_photos(glued), Nothing(), 500.0)
+    assert not find_seam_lines(SeamSearch(BOARD, [shelf], made_photos(glued), Nothing(), 500.0))

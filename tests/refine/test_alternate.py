@@ -9,7 +9,7 @@ from shapely.geometry import box
 from clouds import pose, sheet
 from kerfwright.assemble.types import Assembly, ConstraintSegment
 from kerfwright.identify.types import Parts
-from kerfwright.refine import Outline, RefineOptions, alternate
+from kerfwright.refine import BoundaryLoop, Outline, RefineOptions, alternate
 
 TRACED, RUN_ON = box(0, 0, 200, 110), box(0, 0, 200, 120)
 
@@ -36,3 +36,32 @@ def test_without_constraints_boards_keep_the_outlines_that_were_traced(again):
     assembly = again(use_constraints=False)
     assert assembly.sheets[0].region.equals(TRACED)
     assert assembly.constraints == ((),)
+
+
+def piece(region, z: float = 50.0) -> alternate.Piece:
+    """A board whose outline has the corners of its region."""
+    ring = np.asarray(region.exterior.coords)[:-1]
+    own = sheet("board", pose((0, 0, z)), 18.0, region, top_idx=np.array([int(z)]))
+    return alternate.Piece(own, Outline((BoundaryLoop(ring, np.full(len(ring), 0.2)),), "images"))
+
+
+LEG = box(0, 0, 80, 400).union(box(0, 300, 145, 400))
+FACING = box(220, 0, 300, 400).union(box(143, 300, 300, 400))
+
+
+def test_two_legs_that_both_have_half_of_the_rail_become_one_board():
+    (one,) = alternate._one_where_they_overlap([piece(LEG), piece(FACING)], 500.0)
+    assert one.sheet.region.symmetric_difference(LEG.union(FACING)).area < 1
+    assert sum(len(loop.points) for loop in one.outline.loops) == 16
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        (piece(box(0, 0, 101, 400)), piece(box(99, 0, 200, 400))),  # plain neighbours, traced a little too wide
+        (piece(LEG), piece(FACING, z=90.0)),  # in another plane
+        (piece(LEG), piece(box(220, 0, 300, 400))),  # apart
+    ],
+)
+def test_other_neighbours_stay_two(first, second):
+    assert alternate._one_where_they_overlap([first, second], 500.0) == [first, second]

@@ -22,7 +22,7 @@ from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.types import Sheet
 from kerfwright.model import Contact, ContactEvidence
 
-__all__ = ["SeamLine", "find_seam_lines", "seam_contact", "seam_segments", "split_sheet"]
+__all__ = ["SeamLine", "SeamSearch", "find_seam_lines", "seam_contact", "seam_segments", "split_sheet"]
 
 LEAST_STRENGTH = 7.0  # of a board's best seam, against the usual change across lines of its face
 LENT_STRENGTH = 4.0  # of further ones: where two boards were glued, more may have been
@@ -39,6 +39,7 @@ PARTNER = 0.7  # strength of the weaker line of the two
 NARROWEST = 1 / 16  # of D; narrower strips are shadows and edges more often than boards
 KNOWN = 1 / 40  # of D, round lines in which other boards meet this one
 
+
 @dataclass(frozen=True, eq=False)
 class SeamLine:
     """The line m.xy = offset across a board, board frame mm, from start to end."""
@@ -52,20 +53,39 @@ class SeamLine:
     gap: float = 0.0  # mm between the two boards, where their eased edges show as two lines
 
 
-def find_seam_lines(
-    sheet: Sheet, touching: list[Sheet], photos: Photos, obstacles: Obstacles, diameter: float
-) -> list[SeamLine]:
+@dataclass(frozen=True, eq=False)
+class SeamSearch:
+    """A board, the boards that touch it, and the photographs in which seams across it are looked for."""
+
+    sheet: Sheet
+    touching: list[Sheet]
+    photos: Photos
+    obstacles: Obstacles
+    diameter: float
+
+    def across(self, m: np.ndarray, least: float = 0.0) -> list[SeamLine]:
+        """Seams square to m on the face that shows the strongest one, all that the other face does not deny.
+
+        least : strength of a seam where one is expected; 0 asks for one that is clear by itself.
+        """
+        faces = [_change(self.sheet, m, face, self.photos, self.obstacles, self.diameter) for face in ("top", "bottom")]
+        found = []
+        for own, other in (faces, faces[::-1]):
+            seams = [] if own is None else _seams_across(self.sheet, m, own, self.touching, self.diameter, least)
+            found.append([s for s in seams if not _is_denied(s, own, other, self.diameter)])
+        return max(found, key=_strongest)
+
+
+def _strongest(seams: list[SeamLine]) -> float:
+    return max((s.strength for s in seams), default=0.0)
+
+
+def find_seam_lines(search: SeamSearch) -> list[SeamLine]:
     """Seams across a board in the direction that shows the strongest one, in order along it."""
-    ring = np.asarray(sheet.region.minimum_rotated_rectangle.exterior.coords)
+    ring = np.asarray(search.sheet.region.minimum_rotated_rectangle.exterior.coords)
     first = (ring[1] - ring[0]) / np.linalg.norm(ring[1] - ring[0])
-    found = []
-    for m in (first, np.array([-first[1], first[0]])):
-        top, bottom = (_change(sheet, m, face, photos, obstacles, diameter) for face in ("top", "bottom"))
-        for own, other in ((top, bottom), (bottom, top)):
-            seams = _seams_across(sheet, m, own, touching, diameter) if own is not None else []
-            found.append([s for s in seams if not _is_denied(s, own, other, diameter)])
-    best = max(found, key=lambda seams: max((s.strength for s in seams), default=0.0))
-    return sorted(best, key=lambda s: s.offset)
+    found = [search.across(m) for m in (first, np.array([-first[1], first[0]]))]
+    return sorted(max(found, key=_strongest), key=lambda s: s.offset)
 
 
 def _change(
@@ -90,18 +110,20 @@ def _is_denied(seam: SeamLine, own: Discontinuity, other: Discontinuity | None, 
 
 
 def _seams_across(
-    sheet: Sheet, m: np.ndarray, change: Discontinuity, touching: list[Sheet], diameter: float
+    sheet: Sheet, m: np.ndarray, change: Discontinuity, touching: list[Sheet], diameter: float, least: float
 ) -> list[SeamLine]:
+    """Seams of one face: those stronger than `least`, or, where that is 0, all if one of them is clear."""
     ring = np.asarray(sheet.region.exterior.coords)[:, :2]
     margin = NARROWEST * diameter
     known = _known_lines(sheet, m, touching)
-    seams = [_seam(change, k, m, ring, diameter) for k in _seam_places(change, ring @ m, margin)]
+    places = _seam_places(change, ring @ m, margin, least or LENT_STRENGTH)
+    seams = [_seam(change, k, m, ring, diameter) for k in places]
     seams = [
         s for s in seams
         if all(abs(s.offset - other) > KNOWN * diameter for other in known)
         and _crosses_all(sheet.region, m, s.offset, margin / 4)
     ]
-    return seams if any(_is_clear(s) for s in seams) else []
+    return seams if least or any(_is_clear(s) for s in seams) else []
 
 
 def _is_clear(seam: SeamLine) -> bool:
@@ -109,13 +131,13 @@ def _is_clear(seam: SeamLine) -> bool:
     return seam.strength > LEAST_STRENGTH and (seam.views > LEAST_VIEWS or seam.strength > CERTAIN * LEAST_STRENGTH)
 
 
-def _seam_places(change: Discontinuity, across: np.ndarray, margin: float) -> list[int]:
+def _seam_places(change: Discontinuity, across: np.ndarray, margin: float, least: float) -> list[int]:
     """Offsets whose change is strong, runs along the whole line, shows in the views, and is the strongest near by."""
     strength = np.nan_to_num(change.strength)
     inner = (change.offsets > across.min() + margin) & (change.offsets < across.max() - margin)
     reach = round(margin / (change.offsets[1] - change.offsets[0]) * 2 / 3)
     peaks = [
-        int(k) for k in np.flatnonzero(inner & (strength > LENT_STRENGTH))
+        int(k) for k in np.flatnonzero(inner & (strength > least))
         if strength[k] == strength[max(0, k - reach) : k + reach + 1].max()
     ]
     return [k for k in peaks if change.along(k) >= LEAST_ALONG and change.unbroken(k) and _agreed(change.views(k))]

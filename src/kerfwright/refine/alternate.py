@@ -5,14 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+from shapely import union_all
 from shapely.geometry import Polygon
 
 from kerfwright.assemble import AssembleOptions, assemble
 from kerfwright.assemble.apart import kept_apart
-from kerfwright.assemble.coplanar import with_own_points
-from kerfwright.assemble.outlines import constrained_region
+from kerfwright.assemble.concave import find_inner_seams, inner_corners
+from kerfwright.assemble.coplanar import in_one_plane, moved_region, with_own_points
+from kerfwright.assemble.outlines import constrained_region, largest_piece
 from kerfwright.assemble.rings import find_ring_seams, split_ring
-from kerfwright.assemble.splits import SeamLine, find_seam_lines, seam_contact, seam_segments, split_sheet
+from kerfwright.assemble.splits import (
+    SeamLine,
+    SeamSearch,
+    find_seam_lines,
+    seam_contact,
+    seam_segments,
+    split_sheet,
+)
 from kerfwright.assemble.types import Assembly
 from kerfwright.assemble.visibility import Obstacles
 from kerfwright.capture.types import Capture
@@ -27,6 +37,9 @@ from kerfwright.refine.types import Outline
 
 __all__ = ["assembled_again", "traced_pieces"]
 
+LEVEL = 1 / 250  # of D, between the faces of pieces in one plane
+SHARED = 0.15  # of the smaller of two pieces in one plane, which they share when they are one board
+RUN_TOGETHER = 0.005  # ... where both have inner corners
 # outlines from photographs are this much better than the cloud's
 EXACT = AssembleOptions(rough=False, outline_error=1 / 200, reach=1 / 60, thickness_floor=1 / 4000)
 
@@ -59,9 +72,50 @@ def traced_pieces(
             if len(board.outlines) > 1:
                 own = with_own_points(own, capture.cloud.points, diameter / 200)
             pieces.append(Piece(own, outline))
+    pieces = _one_where_they_overlap(pieces, diameter)
     if options.use_images and options.use_seams:
         pieces = _split(pieces, assembly, capture)
     return tuple(replace(p, sheet=replace(p.sheet, name=f"board_{k + 1:02d}")) for k, p in enumerate(pieces))
+
+
+def _one_where_they_overlap(pieces: Sequence[Piece], diameter: float) -> list[Piece]:
+    """The pieces, those joined that lie in one plane and share wood: two boards do not, and the photographs showed both
+    that they reach there.
+    """
+    out: list[Piece] = []
+    for piece in pieces:
+        k = next((k for k, other in enumerate(out) if _share_wood(other.sheet, piece.sheet, diameter)), None)
+        if k is None:
+            out.append(piece)
+        else:
+            out[k] = _joined(out[k], piece)
+    return out
+
+
+def _share_wood(a: Sheet, b: Sheet, diameter: float) -> bool:
+    """Whether two pieces are one board: much of one lies in the other, or both have inner corners and run together in
+    the middle of what they reach out for, as two legs do for the rail between them.
+    """
+    if not in_one_plane(a, b, LEVEL * diameter):
+        return False
+    shared = a.region.intersection(moved_region(b, a)).area / min(a.region.area, b.region.area)
+    bent = all(len(inner_corners(s.region, diameter)) for s in (a, b))
+    return bool(shared > (RUN_TOGETHER if bent else SHARED))
+
+
+def _joined(a: Piece, b: Piece) -> Piece:
+    """Two pieces as one, in the frame of the first."""
+    region = largest_piece(union_all([a.sheet.region, moved_region(b.sheet, a.sheet)]))
+    names = ("top_idx", "bottom_idx", "cut_idx")
+    theirs = names if a.sheet.normal @ b.sheet.normal > 0 else (names[1], names[0], names[2])
+    idx = {n: np.union1d(getattr(a.sheet, n), getattr(b.sheet, m)) for n, m in zip(names, theirs, strict=True)}
+    loops = tuple(replace(loop, points=_moved(loop.points, b.sheet, a.sheet)) for loop in b.outline.loops)
+    outline = replace(a.outline, loops=(*a.outline.loops, *loops))
+    return Piece(replace(a.sheet, region=region, **idx), outline)
+
+
+def _moved(xy: np.ndarray, sheet: Sheet, to: Sheet) -> np.ndarray:
+    return to.to_board(sheet.to_world(np.c_[xy, np.zeros(len(xy))]))[:, :2]
 
 
 def assembled_again(
@@ -97,7 +151,8 @@ def _split(pieces: list[Piece], assembly: Assembly, capture: Capture) -> list[Pi
         if ring:
             return ring
         touching = _touching(piece.sheet.name, assembly)
-        seams = find_seam_lines(piece.sheet, touching, photos, obstacles, diameter)
+        search = SeamSearch(piece.sheet, touching, photos, obstacles, diameter)
+        seams = find_seam_lines(search) or find_inner_seams(search)
         if not seams:
             return [piece]
         sheets = split_sheet(piece.sheet, seams, capture.cloud.points)

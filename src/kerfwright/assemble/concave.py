@@ -1,0 +1,107 @@
+"""Boards flush in one plane that were found as one: seams that begin at the inner corners of its outline.
+
+A rail between two legs, level with them, makes a region like a U. No seam runs right across it; each runs on from an
+inner corner to the far side of the wood. There the geometry expects one, and a fainter change than usual is enough.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from shapely.geometry import LineString, Polygon
+
+from kerfwright.assemble.outlines import largest_piece
+from kerfwright.assemble.splits import SeamLine, SeamSearch
+
+__all__ = ["find_inner_seams", "inner_corners"]
+
+COARSE = 1 / 60  # of D, to which outlines are simplified: what is left of them has corners
+LEAST_EDGE = 1 / 20  # of D, on both sides of a corner
+LEAST_TURN = 0.5  # sine; grows with the turn up to square corners, and inner corners are that or nearly
+NEAR = 1 / 70  # of D, between an inner corner and its seam
+BESIDE = 1 / 100  # of D, to either side of a seam: there its two ends are looked for
+NARROWEST = 1 / 16  # of D, of the wood along a seam
+LEAST_STRENGTH = 3.0  # against the usual change across lines of the face
+STRAY = 0.1  # of a strip between seams that may lie in further pieces
+
+
+def find_inner_seams(search: SeamSearch) -> list[SeamLine]:
+    """Seams from inner corners of a board's outline, all in the direction that shows the strongest, in order along it.
+    """
+    sheet = search.sheet
+    ring = np.asarray(sheet.region.minimum_rotated_rectangle.exterior.coords)
+    first = (ring[1] - ring[0]) / np.linalg.norm(ring[1] - ring[0])
+    corners = inner_corners(sheet.region, search.diameter)
+    found = [_seams(search, m, corners) for m in (first, np.array([-first[1], first[0]]))]
+    best = max(found, key=lambda seams: max((s.strength for s in seams), default=0.0))
+    best = sorted(best, key=lambda s: s.offset)
+    return best if _parts_whole(sheet.region, best) else []
+
+
+def inner_corners(region: Polygon, diameter: float) -> np.ndarray:
+    """(N, 2) corners of the coarse outline at which the wood fills more than half a turn."""
+    ring = np.asarray(region.simplify(COARSE * diameter).exterior.coords)[:-1, :2]
+    before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    lengths = np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1)
+    sine = (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]) / lengths[0] / lengths[1]
+    sine = sine if region.exterior.is_ccw else -sine
+    return ring[(sine < -LEAST_TURN) & (np.minimum(*lengths) > LEAST_EDGE * diameter)]
+
+
+def _seams(search: SeamSearch, m: np.ndarray, corners: np.ndarray) -> list[SeamLine]:
+    """At most one seam a corner along the tangent of m; corners on one line share theirs."""
+    found: list[SeamLine] = []
+    near = NEAR * search.diameter
+    for corner in corners:
+        if any(abs(s.offset - corner @ m) < near for s in found):
+            continue
+        band = _band(search.sheet.region, m, corner, search.diameter)
+        if band is not None:
+            own = replace(search, sheet=replace(search.sheet, region=band))
+            seams = [s for s in own.across(m, LEAST_STRENGTH) if abs(s.offset - corner @ m) < near]
+            found += sorted(seams, key=lambda s: -s.strength)[:1]
+    return found
+
+
+def _band(region: Polygon, m: np.ndarray, corner: np.ndarray, diameter: float) -> Polygon | None:
+    """The part of a region that lies, along the tangent, where the wood beside the corner does: the shorter of the two
+    stretches of wood to its sides. None where that is too short for a seam.
+    """
+    tangent = np.array([-m[1], m[0]])
+    sides = [_stretch(region, m, corner, shift * BESIDE * diameter) for shift in (-1, 1)]
+    if None in sides:
+        return None
+    low, high = min(sides, key=lambda s: s[1] - s[0])
+    if high - low < NARROWEST * diameter:
+        return None
+    far = 4 * region.length
+    frame = [(-far, low), (far, low), (far, high), (-far, high)]
+    return largest_piece(region.intersection(Polygon([u * m + v * tangent for u, v in frame])))
+
+
+def _stretch(region: Polygon, m: np.ndarray, corner: np.ndarray, shift: float) -> tuple[float, float] | None:
+    """Where, along the tangent, the wood nearest to the corner lies on a line beside it."""
+    tangent = np.array([-m[1], m[0]])
+    middle, far = (corner @ m + shift) * m, 4 * region.length
+    cut = region.intersection(LineString([middle - far * tangent, middle + far * tangent]))
+    lines = [g for g in getattr(cut, "geoms", [cut]) if g.geom_type == "LineString" and not g.is_empty]
+    runs = [tuple(sorted(np.asarray(g.coords)[[0, -1]] @ tangent)) for g in lines]
+    place = corner @ tangent
+    return min(runs, key=lambda run: max(run[0] - place, place - run[1], 0.0), default=None)
+
+
+def _parts_whole(region: Polygon, seams: list[SeamLine]) -> bool:
+    """Whether each strip between the seams holds one piece of wood: a ladder's rungs would be lost."""
+    if not seams:
+        return True
+    m, far = seams[0].m, 4 * region.length
+    tangent = np.array([-m[1], m[0]])
+    bounds = [-far, *(s.offset for s in seams), far]
+    for low, high in pairwise(bounds):
+        frame = [(low, -far), (high, -far), (high, far), (low, far)]
+        strip = region.intersection(Polygon([u * m + v * tangent for u, v in frame]))
+        if strip.area - largest_piece(strip).area > STRAY * strip.area:
+            return False
+    return True
