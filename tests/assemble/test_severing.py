@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from clouds import pose, sheet
+from kerfwright.assemble import AssembleOptions
+from kerfwright.assemble.constraints import constraint_segments
 from kerfwright.assemble.decided import Decided
 from kerfwright.assemble.joints import Search, end_on
 from kerfwright.assemble.severing import severed_share, without_severing
@@ -50,3 +52,25 @@ def test_a_square_corner_by_default_does_not_turn_one_decided_by_a_seam() -> Non
     unsure = replace(STANDS, kind=2, other=STANDS.joint, evidence=ContactEvidence(decided_by="default"))
     clear = corner(2, 0, "seam")
     assert without_severing(SHEETS, [unsure, clear])[1] is clear
+
+
+def test_the_side_ends_square_where_the_bottom_ends_on_it_and_not_flush_with_the_diagonal() -> None:
+    found = [STANDS, corner(0, 2)]
+    (side, _, diagonal) = constraint_segments(SHEETS, found, 500.0, AssembleOptions())
+    assert not [s for s in side if s.origin == "corner"]
+    assert [s.origin for s in diagonal if s.contact == 1] == ["contact"]
+    (alone, _, _) = constraint_segments(SHEETS, found[1:], 500.0, AssembleOptions())
+    assert [s.origin for s in alone if s.contact == 0] == ["corner"]
+
+
+def test_both_slants_of_a_pointed_end_lie_on_one_line_though_the_planes_are_a_little_turned() -> None:
+    turned = np.eye(4)
+    turned[:2, :2] = [[np.cos(7e-4), -np.sin(7e-4)], [np.sin(7e-4), np.cos(7e-4)]]
+    side = replace(SIDE, world_from_board=turned @ SIDE.world_from_board)
+    sheets = (side, BOTTOM, replace(DIAGONAL, world_from_board=pose((-6, 0, T - 6), SLANT, (0, 1, 0))))
+    found = [Decided(end_on(sheets, k, 2, SEARCH), 1, None, ContactEvidence()) for k in (0, 1)]
+    first, second = constraint_segments(sheets, found, 500.0, AssembleOptions())[2]
+    along = (first.end - first.start) / np.linalg.norm(first.end - first.start)
+    for place in (second.start, second.end):
+        away = place - first.start
+        assert abs(away[0] * along[1] - away[1] * along[0]) < 1e-9

@@ -9,6 +9,7 @@ import numpy as np
 from kerfwright.assemble.decided import Decided
 from kerfwright.assemble.joints import Joint, Trace, columns, face_plane, runs_of, trace_of
 from kerfwright.assemble.options import AssembleOptions
+from kerfwright.assemble.severing import severs
 from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.identify.types import Sheet
 
@@ -21,7 +22,10 @@ PLANE_ERROR = 0.15  # mm; standard error of an aligned sheet plane, of a board s
 def constraint_segments(
     sheets: tuple[Sheet, ...], decided: list[Decided], diameter: float, options: AssembleOptions
 ) -> tuple[tuple[ConstraintSegment, ...], ...]:
-    """Per board its constraint segments: contacts first, then corners, then the ground."""
+    """Per board its constraint segments: contacts first, then corners, then the ground.
+
+    A board that runs through a corner ends flush with the other one's outer face, unless a third one ends on it there.
+    """
     out: list[list[ConstraintSegment]] = [[] for _ in sheets]
     traces = _pointed(sheets, decided)
     for number, d in enumerate(decided):
@@ -30,7 +34,7 @@ def constraint_segments(
             out[d.joint.a] += _segments(d.other.trace, d.other.intervals, "contact", number)
         elif d.flush is not None:
             out[d.joint.a] += _segments(d.flush.trace, d.flush.intervals, "corner", number)
-        elif d.kind == 2:
+        elif d.kind == 2 and not severs(sheets, d.other, d, decided):
             trace = _outer_trace(sheets, d)
             if trace is not None and not _cuts_a_footing(sheets, d, decided, FOOTING * diameter):
                 out[d.joint.a] += _segments(trace, d.other.intervals, "corner", number)
@@ -53,8 +57,23 @@ def _pointed(sheets: tuple[Sheet, ...], decided: list[Decided]) -> list[Trace]:
             height = (base[1] - base[0]) / (a.slope - b.slope)
             if 0 < height < sheets[one.joint.b].thickness.value:
                 offset = base[0] + a.slope * height
-                traces[i], traces[j] = (replace(t, offset=offset, depth=height) for t in (a, b))
+                moved = [replace(t, offset=offset, depth=height) for t in (a, b)]
+                traces[i], traces[j] = _on_one_line(moved, (one.joint, decided[j].joint))
     return traces
+
+
+def _on_one_line(traces: list[Trace], joints: tuple[Joint, Joint]) -> list[Trace]:
+    """Two traces along the same point of a board, which differ by the angle of their planes, in one direction: an edge
+    lies on both.
+    """
+    m = traces[0].m + traces[1].m
+    m = m / np.linalg.norm(m)
+    middles = [
+        t.place(np.zeros(1), np.array([(j.intervals[0][0] + j.intervals[-1][1]) / 2]))[0]
+        for t, j in zip(traces, joints, strict=True)
+    ]
+    offset = float(np.mean([place @ m for place in middles]))
+    return [replace(t, m=m, tangent=np.array([-m[1], m[0]]), offset=offset) for t in traces]
 
 
 def _segments(

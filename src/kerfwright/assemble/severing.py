@@ -17,7 +17,7 @@ from kerfwright.assemble.decided import Decided, swapped
 from kerfwright.assemble.joints import Joint
 from kerfwright.identify.types import Sheet
 
-__all__ = ["severed_share", "without_severing"]
+__all__ = ["severed_share", "severs", "without_severing"]
 
 SQUARE = 0.02  # slope of a cut that counts as square
 SEVERED = 0.3  # of another contact's interface; less is a rough outline
@@ -33,6 +33,12 @@ def without_severing(sheets: Sequence[Sheet], found: Sequence[Decided]) -> list[
 
 def _is_square(joint: Joint) -> bool:
     return abs(joint.trace.slope) < SQUARE
+
+
+def severs(sheets: Sequence[Sheet], joint: Joint, corner: Decided, found: Sequence[Decided]) -> bool:
+    """Whether the cut of a slanted corner's `joint` takes away wood on which a board ends by a square contact."""
+    square = [c.joint for c in found if c is not corner and c.kind != 4 and _is_square(c.joint)]
+    return not _is_square(joint) and any(severed_share(sheets, joint, c) >= SEVERED for c in square)
 
 
 def _turned(sheets: Sequence[Sheet], d: Decided, found: Sequence[Decided]) -> Decided:
