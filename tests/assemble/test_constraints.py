@@ -113,7 +113,7 @@ def corner_with_a_diagonal():
     n, u = np.array([1, 0, 1]) / np.sqrt(2), np.array([1, 0, -1]) / np.sqrt(2)
     top = sheet("top", pose((-200, 0, 0), (1, 0, 0), (0, 1, 0)), 16.0, (0, 0, 400, 100))
     diagonal = sheet("diagonal", pose(np.array([-184, 0, 0]) - 8 * n, u, (0, 1, 0)), 16.0, (3, 0, 250, 100))
-    inner = Joint(1, 0, "top", trace_of(top, *face_plane(diagonal, "top")), ((-100.0, 0.0),), 0.0, np.zeros((0, 2)))
+    inner = Joint(1, 0, "top", trace_of(top, *face_plane(diagonal, "top")), ((0.0, 100.0),), 0.0, np.zeros((0, 2)))
     return (top, diagonal), Decided(joint((top, diagonal), 0, 1), 2, inner, ContactEvidence())
 
 

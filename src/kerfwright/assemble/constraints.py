@@ -15,7 +15,6 @@ from kerfwright.identify.types import Sheet
 
 __all__ = ["constraint_segments"]
 
-FOOTING = 1 / 250  # of D by which an end may cut into where another board ends
 PLANE_ERROR = 0.15  # mm; standard error of an aligned sheet plane, of a board seen from half a metre
 
 
@@ -36,7 +35,7 @@ def constraint_segments(
             out[d.joint.a] += _segments(d.flush.trace, d.flush.intervals, "corner", number)
         elif d.kind == 2 and not severs(sheets, d.other, d, decided):
             trace = _outer_trace(sheets, d)
-            if trace is not None and not _cuts_a_footing(sheets, d, decided, FOOTING * diameter):
+            if trace is not None:
                 out[d.joint.a] += _segments(trace, d.other.intervals, "corner", number)
     for k, sheet in enumerate(sheets):
         contacts = [d.joint for d in decided if d.joint.b == k]
@@ -97,24 +96,6 @@ def _outer_trace(sheets: tuple[Sheet, ...], d: Decided) -> Trace | None:
     inner = d.other.face_a  # of b, on which a would have ended
     normal, offset = face_plane(b, "bottom" if inner == "top" else "top")
     return trace_of(sheets[d.joint.a], -normal, -offset)
-
-
-def _cuts_a_footing(sheets: tuple[Sheet, ...], d: Decided, decided: list[Decided], tolerance: float) -> bool:
-    """Whether an end flush with the outer face of the board that stops at a corner would take away where a third one
-    ends on the same face: a diagonal in the corner of a case does not close it, the case's side does.
-    """
-    b = sheets[d.joint.b]
-    normal, offset = face_plane(b, "bottom" if d.other.face_a == "top" else "top")
-    for e in decided:
-        if e is d or (e.joint.a, e.joint.face_a) != (d.joint.a, d.joint.face_a) or e.joint.b == d.joint.b:
-            continue
-        third = sheets[e.joint.b]
-        flat = np.concatenate([e.joint.trace.place(np.zeros(2), np.array(run)) for run in e.joint.intervals])
-        feet = [third.to_world(np.c_[flat, np.full(len(flat), z)]) for z in (0.0, third.thickness.value)]
-        beyond = np.concatenate(feet) @ normal - offset  # of a board that stands along the end; others run across it
-        if beyond.max() > tolerance and np.ptp(beyond) < 2 * third.thickness.value and beyond.min() < 0:
-            return True
-    return False
 
 
 def _ground(sheet: Sheet, contacts: list[Joint], diameter: float, options: AssembleOptions) -> list[ConstraintSegment]:
