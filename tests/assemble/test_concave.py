@@ -59,6 +59,15 @@ def test_rail_between_legs_is_cut_off_at_the_inner_corners() -> None:
         assert sorted([seam.start[1], seam.end[1]]) == [pytest.approx(290, abs=1), pytest.approx(400, abs=1)]
 
 
+def test_seam_lies_in_the_line_of_the_free_edge() -> None:
+    def shaded(x, y):
+        return three_boards(np.where(x < 180, x - 4, x), y)  # the photographs show the left one 4 mm off
+
+    seams = find_inner_seams(searched(shaded))
+    assert sorted(abs(s.offset) for s in seams) == [pytest.approx(x, abs=0.2) for x in (90, 270)]
+    assert sorted(abs(s.start @ s.m) for s in seams) == [pytest.approx(x, abs=0.2) for x in (90, 270)]
+
+
 def test_a_board_cut_out_of_one_piece_stays_whole() -> None:
     assert not find_inner_seams(searched(wood))
 

@@ -23,6 +23,8 @@ LEAST_TURN = 0.5  # sine; grows with the turn up to square corners, and inner co
 NEAR = 1 / 70  # of D, between an inner corner and its seam
 BESIDE = 1 / 100  # of D, to either side of a seam: there its two ends are looked for
 NARROWEST = 1 / 16  # of D, of the wood along a seam
+SAMPLE = 1 / 5  # of that, between places on the free edge that a seam prolongs
+FEWEST = 20  # of them
 LEAST_STRENGTH = 3.0  # against the usual change across lines of the face
 STRAY = 0.1  # of a strip between seams that may lie in further pieces
 
@@ -61,8 +63,23 @@ def _seams(search: SeamSearch, m: np.ndarray, corners: np.ndarray) -> list[SeamL
         if band is not None:
             own = replace(search, sheet=replace(search.sheet, region=band))
             seams = [s for s in own.across(m, LEAST_STRENGTH) if abs(s.offset - corner @ m) < near]
-            found += sorted(seams, key=lambda s: -s.strength)[:1]
+            seams = sorted(seams, key=lambda s: -s.strength)[:1]
+            found += [_in_line(s, search.sheet.region, band, corner, near) for s in seams]
     return found
+
+
+def _in_line(seam: SeamLine, region: Polygon, band: Polygon, corner: np.ndarray, near: float) -> SeamLine:
+    """The seam moved into the line of the free edge that it prolongs, which is known better: both are the leg's."""
+    ring = region.exterior
+    points = np.array([ring.interpolate(s).coords[0] for s in np.arange(0, ring.length, SAMPLE * near)])
+    tangent = np.array([-seam.m[1], seam.m[0]])
+    along, wood = points @ tangent, np.asarray(band.exterior.coords) @ tangent
+    outside = (along < wood.min() - near / 2) | (along > wood.max() + near / 2)
+    edge = points[outside & (np.abs(points @ seam.m - corner @ seam.m) < near)] @ seam.m
+    if len(edge) < FEWEST:
+        return seam
+    shift = float(np.median(edge)) - seam.offset
+    return replace(seam, offset=seam.offset + shift, start=seam.start + shift * seam.m, end=seam.end + shift * seam.m)
 
 
 def _band(region: Polygon, m: np.ndarray, corner: np.ndarray, diameter: float) -> Polygon | None:

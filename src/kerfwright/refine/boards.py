@@ -112,7 +112,8 @@ def _bevel(
     place = [turn @ np.asarray(p) - shift for p in (ends[0][1], ends[-1][1])]
     normal = np.array([*(turn @ segment.normal[:2]), segment.normal[2]])
     angle = np.degrees(np.arctan2(segment.normal[2], np.hypot(*segment.normal[:2])))
-    point = np.array([*(turn @ segment.start - shift), segment.depth])
+    middle = (segment.start + segment.end) / 2  # two planes that end a board in a point share a line; there both hold
+    point = np.array([*(turn @ middle - shift), segment.depth])
     return Bevel(
         start=tuple(map(float, place[0])), end=tuple(map(float, place[1])), point=tuple(map(float, point)),
         normal=tuple(map(float, normal)), angle=Quantity(value=float(angle), origin=Origin.IMPLIED),
