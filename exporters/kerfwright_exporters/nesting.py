@@ -32,7 +32,8 @@ LONG_STEP, SHORT_STEP, SHORTEST_STEP = (
     0.002,
     0.0002,
 )  # of the length in use, by which the last sheet is cut shorter
-EXPLORING = 0.7  # share of the moves spent on long steps
+SAVING = 0.4  # share of the moves that may be spent on a sheet less
+EXPLORING = 0.7  # share of those left that is spent on long steps
 FAILURES_A_BOARD = 3  # in a row, after which few boards, whose layouts have all been tried, are left as they are
 DENSEST = 0.97  # share of a sheet that boards with curves and corners hardly fill
 MANY_CORNERS, STRAY = 24, 0.25  # outlines of more corners are drawn with fewer, up to twice so far outside, mm
@@ -158,13 +159,24 @@ class _Search:
 
     def _fewer_sheets(self, best: _Layout) -> _Layout:
         """Without the last sheet, as long as its boards find room on the others."""
+        spare = int((1 - SAVING) * self.moves)
         while len(best.lengths) > 1 and self.areas.sum() < DENSEST * self.full.prod() * (len(best.lengths) - 1):
             fewer = best.copy()
             fewer.lengths = fewer.lengths[:-1]
-            if not self._apart(fewer, self.moves // 3):
-                return best
+            if not self._found_room(fewer, spare):
+                break
             best = fewer
         return best
+
+    def _found_room(self, layout: _Layout, spare: int) -> bool:
+        """Move boards until none overlap; where that fails, go on from there with two boards in each other's place."""
+        for _ in range(FAILURES_A_BOARD * len(self.areas)):
+            if self.moves <= spare:
+                break
+            if self._apart(layout, self.moves - spare):
+                return True
+            self._disrupt(layout)
+        return False
 
     def _shortened(self, best: _Layout, sizes: np.ndarray) -> _Layout:
         """With the last sheet as short as it gets."""

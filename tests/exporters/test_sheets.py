@@ -93,6 +93,11 @@ def test_a_sheet_that_is_not_needed_is_saved():
     assert {place.sheet for place in places} == {0}
 
 
+def test_a_sheet_is_saved_at_a_later_attempt():
+    options = NestOptions(900, 435, 6.0, (0, 180), layouts=5, coarse=60, fine=100, moves=1500)
+    assert max(place.sheet for place in nest(outlines(12, 5), options)) == 1
+
+
 def test_parts_are_convex_and_make_up_the_whole():
     plate = shapely.Polygon(
         [(0, 0), (300, 0), (300, 100), (200, 100), (200, 60), (100, 60), (100, 200), (0, 200)],
