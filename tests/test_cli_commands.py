@@ -1,31 +1,13 @@
 """The smaller commands, run in this process: OCCT takes seconds to import."""
 
 import json
-import sys
 from importlib import import_module
-from types import SimpleNamespace
 
 import pytest
 
-from kerfwright import cli
 from kerfwright.demo import demo_capture
 from kerfwright.model import Board, CutPath, Line, Loop, Model, Quantity
 from kerfwright.model.io import write_model
-
-
-@pytest.fixture
-def kerfwright(monkeypatch, capsys):
-    """Run the command line; exit code, standard output and standard error."""
-    monkeypatch.setenv("XDG_CONFIG_HOME", "/nonexistent")
-
-    def run(*arguments) -> SimpleNamespace:
-        monkeypatch.setattr(sys, "argv", ["kerfwright", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        said = capsys.readouterr()
-        return SimpleNamespace(returncode=ended.value.code, stdout=said.out, stderr=said.err)
-
-    return run
 
 
 def board(name: str, x: float, y: float = 0) -> Board:

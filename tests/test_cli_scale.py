@@ -1,29 +1,12 @@
 """The options that say how large, how cropped and how high: refused in one line before any work."""
 
 import sys
-from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import pytest
 
-from kerfwright import cli
 from kerfwright.demo import demo_capture
-
-
-@pytest.fixture
-def kerfwright(monkeypatch, capsys):
-    """Run the command line; exit code, standard output and standard error."""
-    monkeypatch.setenv("XDG_CONFIG_HOME", "/nonexistent")
-
-    def run(*arguments) -> SimpleNamespace:
-        monkeypatch.setattr(sys, "argv", ["kerfwright", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        said = capsys.readouterr()
-        return SimpleNamespace(returncode=ended.value.code, stdout=said.out, stderr=said.err)
-
-    return run
 
 
 @pytest.mark.parametrize(
