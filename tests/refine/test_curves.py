@@ -45,6 +45,26 @@ def bumped(depth, width, side="cosine"):
     return BoundaryLoop(points, base.standard_error)
 
 
+def stepped(shift):
+    """A 300 x 100 rectangle whose lower side is moved inwards by shift(x)."""
+    base = boundary([(0, 0), (300, 0), (300, 100), (0, 100)], seed=5, noise=0.1)
+    points = base.points.copy()
+    lower = points[:, 1] < 20
+    points[lower, 1] += shift(points[lower, 0])
+    return BoundaryLoop(points, base.standard_error)
+
+
+def test_a_side_traced_along_both_lines_of_an_eased_edge_is_one_line():
+    path = fit_cut_path([stepped(lambda x: 1.3 * (np.abs(x - 120) < 70))])
+    assert [e.kind for e in path.outer.edges] == ["line"] * 4
+
+
+@pytest.mark.parametrize("shift", [lambda x: 6.0 * (np.abs(x - 120) < 70), lambda x: 3 * (1 - ((x - 150) / 150) ** 2)])
+def test_high_steps_and_even_bows_stay(shift):
+    edges = fit_cut_path([stepped(shift)]).outer.edges
+    assert len(edges) > 4 or "arc" in {e.kind for e in edges}
+
+
 def test_corner_of_two_constraints_closes_though_the_boundary_cuts_it_off():
     cut_off = boundary([(0, 0), (200, 0), (200, 95), (195, 100), (0, 100)])
     path = fit_cut_path([cut_off], [segment((200.3, 10), (200.3, 80)), segment((150, 100.4), (20, 100.4))])

@@ -13,6 +13,7 @@ from kerfwright.model import CutPath, Loop
 from kerfwright.refine.curves.bumps import without_bumps
 from kerfwright.refine.curves.candidates import find_candidates
 from kerfwright.refine.curves.chain import Chain, best_chain, unit_price
+from kerfwright.refine.curves.nearly import with_straight_edges
 from kerfwright.refine.curves.options import CurveFit, CurveOptions, EdgeStatistics
 from kerfwright.refine.curves.path import check_path, full_circle, loop_of_shape
 from kerfwright.refine.curves.polish import polish
@@ -112,7 +113,8 @@ def _fit_loop(loop: BoundaryLoop, guides: list[GuideLine], options: CurveOptions
     shape = first_shape(chain, samples, guides, options)
     fit = improve(solve(shape, samples, guides), samples, guides, options)
     fit, samples, bumps = without_bumps(fit, samples, guides, options)
-    return _LoopFit(samples, without_slivers(fit, samples, guides, options), None, tuple(bumps))
+    fit = with_straight_edges(without_slivers(fit, samples, guides, options), samples, guides, options)
+    return _LoopFit(samples, fit, None, tuple(bumps))
 
 
 def _chain(samples: Samples, runs: list[Run], guides: list[GuideLine], options: CurveOptions) -> Chain:

@@ -38,6 +38,9 @@ class CurveOptions:
     bump_length, bump_depth : float
         A stretch that leaves a line, comes back to it, and is neither longer nor deeper nor has steep sides is an
         artefact of the boundary (a shadow), not a shape. Notches have steep sides and stay.
+    easing, straight_length : float
+        A stretch between sharp corners, at least so long, that stays so near to one line is that line unless it bows
+        evenly: eased edges show two lines, and the boundary changes between them.
     relation_rise : float
         A relation (parallel, equal radius, ...) is kept if chi-square rises by at most this for each degree of
         freedom it takes away.
@@ -57,6 +60,8 @@ class CurveOptions:
     sharp_angle: float = 0.175
     bump_length: float = 40.0
     bump_depth: float = 5.0
+    easing: float = 1.5
+    straight_length: float = 60.0
     relation_rise: float = 6.6
     max_candidates: int = 72
     use_relations: bool = True
