@@ -1,5 +1,5 @@
-"""Edges that are straight, traced with steps: an eased edge shows two lines, and a boundary that follows one of them here
-and the other there has steps as high as the easing, too long for bumps.
+"""Edges that are straight, traced with steps: an eased edge shows two lines, and a boundary that follows one of them
+here and the other there has steps as high as the easing, too long for bumps.
 
 From one sharp corner to the next, a boundary that stays that near to one line is that line, unless it bows evenly.
 """
