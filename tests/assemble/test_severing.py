@@ -8,7 +8,7 @@ from clouds import pose, sheet
 from kerfwright.assemble import AssembleOptions
 from kerfwright.assemble.constraints import constraint_segments
 from kerfwright.assemble.decided import Decided
-from kerfwright.assemble.joints import Search, end_on
+from kerfwright.assemble.joints import Search, end_on, face_plane
 from kerfwright.assemble.severing import severed_share, without_severing
 from kerfwright.model import ContactEvidence
 
@@ -74,3 +74,7 @@ def test_both_slants_of_a_pointed_end_lie_on_one_line_though_the_planes_are_a_li
     for place in (second.start, second.end):
         away = place - first.start
         assert abs(away[0] * along[1] - away[1] * along[0]) < 1e-9
+    for found_one, own in zip(found, (first, second), strict=True):  # and each slant is the other board's face still
+        normal, offset = face_plane(sheets[found_one.joint.a], found_one.joint.face_a)
+        middle = np.array([*(own.start + own.end) / 2, own.depth])
+        assert abs(sheets[2].to_world(middle[None])[0] @ normal - offset) < 1e-9

@@ -28,7 +28,7 @@ def constraint_segments(
     out: list[list[ConstraintSegment]] = [[] for _ in sheets]
     traces = _pointed(sheets, decided)
     for number, d in enumerate(decided):
-        out[d.joint.b] += _segments(traces[number], d.joint.intervals, "contact", number)
+        out[d.joint.b] += _segments(traces[number], d.joint.intervals, "contact", number, d.joint.trace)
         if d.kind == 4:
             out[d.joint.a] += _segments(d.other.trace, d.other.intervals, "contact", number)
         elif d.flush is not None:
@@ -76,18 +76,25 @@ def _on_one_line(traces: list[Trace], joints: tuple[Joint, Joint]) -> list[Trace
 
 
 def _segments(
-    trace: Trace, intervals: tuple[tuple[float, float], ...], origin: str, contact: int | None
+    trace: Trace, intervals: tuple[tuple[float, float], ...], origin: str, contact: int | None,
+    plane: Trace | None = None,
 ) -> list[ConstraintSegment]:
-    """Directed so that the wood lies on the left."""
+    """Directed so that the wood lies on the left. `plane` is the trace before it was moved to the line of a point."""
     slanted = abs(trace.slope) > 1e-3
-    return [
-        ConstraintSegment(
-            start=trace.place(np.zeros(1), np.array([high]))[0], end=trace.place(np.zeros(1), np.array([low]))[0],
-            origin=origin, standard_error=PLANE_ERROR, normal=trace.normal if slanted else None, depth=trace.depth,
-            contact=contact,
-        )
-        for low, high in intervals
-    ]
+    segments = []
+    for low, high in intervals:
+        start, end = (trace.place(np.zeros(1), np.array([along]))[0] for along in (high, low))
+        depth = _depth_of(plane, (start + end) / 2) if slanted and plane is not None else trace.depth
+        segments.append(ConstraintSegment(
+            start=start, end=end, origin=origin, standard_error=PLANE_ERROR, normal=trace.normal if slanted else None,
+            depth=depth, contact=contact,
+        ))
+    return segments
+
+
+def _depth_of(plane: Trace, place: np.ndarray) -> float:
+    """The height at which a slanted plane passes a place of the board."""
+    return float(plane.depth + (place @ plane.m - plane.offset) / plane.slope)
 
 
 def _outer_trace(sheets: tuple[Sheet, ...], d: Decided) -> Trace | None:
