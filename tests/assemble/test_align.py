@@ -89,8 +89,9 @@ def test_one_direction_is_fitted_to_all_boards_that_share_it():
     assert np.degrees(np.arccos(min(aligned[0].normal[2], 1.0))) < 0.05  # degrees; the worst is off by 0.12
 
 
-def test_alignment_leaves_exact_boards_where_they_are():
-    sheets, cloud = boards(Z, at(X, 0, 0, 300), noise=1e-6)
+@pytest.mark.parametrize("noise", [1e-6, 0.0])
+def test_alignment_leaves_exact_boards_where_they_are(noise):
+    sheets, cloud = boards(Z, at(X, 0, 0, 300), noise=noise)
     aligned, _ = align_sheets(sheets, cloud, OPTIONS)
     for before, after in zip(sheets, aligned, strict=True):
         assert after.world_from_board == pytest.approx(before.world_from_board, abs=1e-5)

@@ -8,6 +8,7 @@ import pytest
 from shapely.geometry import Polygon, box
 
 from clouds import sheet
+from kerfwright.assemble import concave
 from kerfwright.assemble.concave import find_inner_seams, inner_corners
 from kerfwright.assemble.splits import SeamSearch, find_seam_lines
 
@@ -72,6 +73,8 @@ def test_a_board_cut_out_of_one_piece_stays_whole() -> None:
     assert not find_inner_seams(searched(wood))
 
 
-def test_rungs_of_a_ladder_are_not_thrown_away() -> None:
-    ladder = U.union(box(80, 20, 280, 120))
-    assert not find_inner_seams(searched(three_boards, ladder))
+def test_two_rails_at_one_leg_are_left_whole_rather_than_one_thrown_away(monkeypatch) -> None:
+    two_rails = box(0, 0, 90, 400).union(box(80, 290, 360, 400)).union(box(80, 0, 360, 110))
+    assert not find_inner_seams(searched(three_boards, two_rails))
+    monkeypatch.setattr(concave, "_parts_whole", lambda region, seams: True)
+    assert find_inner_seams(searched(three_boards, two_rails))  # the seam is there to be found

@@ -34,6 +34,8 @@ class PlaneEvidence:
     weight: float  # effective number of independent points
 
 
+EXACT = 1e-3  # mm; points of a made cloud lie in their plane, and scatter by nothing
+
 # The ground acts as a board: level and upright boards are square to it. It is known to half a degree, and gives way to
 # level boards.
 UPRIGHT = PlaneEvidence(np.array([0.0, 0, 1]), np.zeros(3), np.diag([1.0, 1.0, 0.0]), 1.0, float(np.radians(0.5)), 1e-3)
@@ -178,7 +180,7 @@ def _offset(sheet: Sheet, evidence: PlaneEvidence, normal: np.ndarray, cloud: Cl
         if len(idx) >= 30:
             z = cloud.points[idx] @ normal
             middle = float(np.median(z))
-            spread = 1.4826 * float(np.median(np.abs(z - middle)))
+            spread = max(1.4826 * float(np.median(np.abs(z - middle))), EXACT)
             found.append(middle + sign * sheet.thickness.value)
             weights.append(len(idx) / spread**2)
     if not found:
