@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import warnings
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from kerfwright.capture import open_capture
 from kerfwright.capture.ply import read_ply
+from kerfwright.capture.readers import read_cloud
 from kerfwright.errors import CaptureError
 from samples import SNIPPETS, readers, write_samples
 
@@ -61,6 +63,7 @@ FILES = [
     "compressed.pcd",
     "a.xyz",
     "a.las",
+    "b.las",
     "a.e57",
 ]
 
@@ -139,8 +142,32 @@ def test_damages_at_which_lazrs_aborts_leave_this_process_alone(good, tmp_path, 
     """In the item record of the LAZ header: the library asks for more memory than there is, and ends its process."""
     data = bytearray((good / "a.laz").read_bytes())
     data[295:297] = record
-    with pytest.raises(CaptureError, match=r"a\.laz: file: .*: it is damaged"):
+    with pytest.raises(CaptureError, match=r"a\.laz: file: lazrs ended with SIGABRT: it is damaged"):
         read_only(good, tmp_path, "a.laz", bytes(data))
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "told"),
+    [
+        ("a.laz", b"laszip encoded", b"nobody encoded", "packing: not told"),
+        ("a.laz", bytes([20, 0, 2, 0]), bytes([20, 0, 1, 0]), "LazrsError"),
+        ("b.laz", b"\x0a\x00\x1e\x00\x03\x00", b"\x0a\x00\x1e\x00\x63\x00", "LazrsError"),
+    ],
+)
+def test_what_laz_files_do_not_tell_or_tell_wrongly(good, tmp_path, name, old, new, told):
+    data = (good / name).read_bytes()
+    assert old in data
+    with pytest.raises(CaptureError, match=told):
+        read_only(good, tmp_path, name, data.replace(old, new, 1))
+
+
+@pytest.mark.parametrize("name", ["a", "b"])
+def test_laz_holds_what_las_holds(good, name):
+    """Format 2 and, with normals in extra bytes, format 7, which is packed in layers."""
+    plain, packed = (read_cloud(good / f"{name}.{ending}") for ending in ("las", "laz"))
+    np.testing.assert_array_equal(plain.points, packed.points)
+    np.testing.assert_array_equal(plain.colours, packed.colours)
+    assert (packed.normals is not None) == (name == "b") == (plain.normals is not None)
 
 
 @pytest.mark.parametrize("name", ["../../outside.png", "..\\..\\outside.png"])

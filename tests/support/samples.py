@@ -152,7 +152,6 @@ def other_programs(folder: Path) -> None:
 def other_clouds(folder: Path) -> None:
     import laspy
     import open3d as o3d
-    import pye57
 
     points = np.random.default_rng(2).uniform(size=(40, 3))
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
@@ -160,12 +159,33 @@ def other_clouds(folder: Path) -> None:
     o3d.io.write_point_cloud(str(folder / "binary.pcd"), cloud)
     o3d.io.write_point_cloud(str(folder / "compressed.pcd"), cloud, compressed=True)
     (folder / "a.xyz").write_text("\n".join(" ".join(f"{v:.5f}" for v in [*p, 1, 0, -1, 9, 8, 7]) for p in points))
-    las = laspy.LasData(laspy.LasHeader(point_format=2, version="1.2"))
+    _las(folder, "a", laspy.LasHeader(point_format=2, version="1.2"), points)
+    header = laspy.LasHeader(point_format=7, version="1.4")
+    header.add_extra_dims([laspy.ExtraBytesParams(name=f"Normal{a}", type="float32") for a in "XYZ"])
+    _las(folder, "b", header, points)
+    _e57(folder / "a.e57", points)
+
+
+def _las(folder: Path, name: str, header, points: np.ndarray) -> None:
+    """The same points plain and packed; not packed by threads, so that this process can still be forked."""
+    import laspy
+
+    las = laspy.LasData(header)
     las.x, las.y, las.z = points.T
-    las.write(str(folder / "a.las"))
-    las.write(str(folder / "a.laz"))
-    file = pye57.E57(str(folder / "a.e57"), mode="w")
-    file.write_scan_raw({f"cartesian{axis}": points[:, k].copy() for k, axis in enumerate("XYZ")})
+    las.write(str(folder / f"{name}.las"))
+    las.write(str(folder / f"{name}.laz"), laz_backend=laspy.LazBackend.Lazrs)
+
+
+def _e57(path: Path, points: np.ndarray) -> None:
+    """Two scans, the first coloured and with points that are marked as not valid."""
+    import pye57
+
+    file = pye57.E57(str(path), mode="w")
+    data = {f"cartesian{axis}": points[:, k].copy() for k, axis in enumerate("XYZ")}
+    more = {f"color{c}": np.arange(len(points), dtype=np.uint8) for c in ("Red", "Green", "Blue")}
+    more["cartesianInvalidState"] = (np.arange(len(points)) % 5 == 0).astype(np.int8)
+    file.write_scan_raw(data | more, rotation=np.array([0.6, 0, 0, 0.8]), translation=np.array([1.0, 2, 3]))
+    file.write_scan_raw(data)
     file.close()
 
 

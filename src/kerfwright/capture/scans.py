@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import struct
-import subprocess
-import sys
-import tempfile
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -14,6 +10,7 @@ from types import ModuleType
 
 import numpy as np
 
+from kerfwright.capture.laz import check_chunks, read_laz
 from kerfwright.capture.parsing import capture_error, read_bytes
 from kerfwright.capture.raw_cloud import RawCloud, bytes_of, check_count
 from kerfwright.errors import CaptureError
@@ -23,15 +20,6 @@ __all__ = ["read_e57", "read_las"]
 PACKAGES = {"laspy": "laspy[lazrs]", "pye57": "pye57"}
 LAS_MARK, E57_MARK = b"LASF", b"ASTM-E57"
 LEAST_RECORD = 54  # bytes of the head of a variable length record
-UNPACK = """
-import resource, sys
-resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[3]),) * 2)
-import laspy
-laspy.read(sys.argv[1]).write(sys.argv[2])
-"""
-# So many bytes for libraries and their threads; and so many times the points', which are there raw, read and written.
-UNPACK_ROOM, UNPACK_COPIES = 4 * 2**30, 4
-UNPACK_THREADS = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "RAYON_NUM_THREADS": "4"}
 BEST_COMPRESSION = 200  # times, of LAZ; points of a real cloud come to a tenth of that
 
 
@@ -67,7 +55,8 @@ def _guarded(path: Path, mark: bytes, module: str, read: Callable[[ModuleType, P
         remedy = f"run `pip install '{PACKAGES[module]}'`, or export the cloud as PLY"
         raise capture_error(path, "file", f"needs {module}", remedy) from error
     try:
-        return read(library, path)
+        with np.errstate(all="ignore"):  # absurd numbers; what comes of them is judged by whoever takes the cloud
+            return read(library, path)
     except (CaptureError, KeyboardInterrupt, SystemExit):
         raise
     except BaseException as error:  # a panic in lazrs is no Exception
@@ -75,8 +64,8 @@ def _guarded(path: Path, mark: bytes, module: str, read: Callable[[ModuleType, P
         raise capture_error(path, "file", reason, "it is damaged: copy or export it again") from error
 
 
-def _check_las_header(path: Path) -> tuple[int, int, bool]:
-    """How many points, bytes a point, and whether they are packed.
+def _check_las_header(path: Path) -> tuple[int, bool]:
+    """How many points, and whether they are packed.
 
     Refuses what would make laspy read for hours: more records than the file has room for (LAS 1.4 R15, table 3).
     """
@@ -87,66 +76,27 @@ def _check_las_header(path: Path) -> tuple[int, int, bool]:
     _, extra, many = struct.unpack_from("<QIQ", head, 235) if minor >= 4 else (0, 0, 0)
     packed = head[104] & 0xC0 != 0  # the mark of LAZ in the point format
     room = (size - start) * (BEST_COMPRESSION if packed else 1)
-    chunks = _laz_chunks(path, start) if packed else 0
+    if packed:
+        check_chunks(path, start)
     for name, number, least, there in (
         ("variable length records", records, LEAST_RECORD, start - header_size),
         ("extended records", extra, LEAST_RECORD, size),
-        ("chunks", chunks, 1, size),
         ("points", max(count, many), max(length, 20), room),
     ):
         if number * least > there:
             raise capture_error(path, name, number, "more than the file can hold: copy or export it again")
-    return max(count, many), length, packed
-
-
-def _laz_chunks(path: Path, start: int) -> int:
-    """How many chunks the table of a LAZ file claims; the table's place stands before the points."""
-    with path.open("rb") as file:
-        file.seek(start)
-        (table,) = struct.unpack("<q", file.read(8).ljust(8, b"\0"))
-        file.seek(table if table > 0 else max(0, path.stat().st_size + table))
-        return struct.unpack("<II", file.read(8).ljust(8, b"\0"))[1]
+    return max(count, many), packed
 
 
 def _las(laspy: ModuleType, path: Path) -> RawCloud:
-    points, length, packed = _check_las_header(path)
+    points, packed = _check_las_header(path)
     check_count(points, path, "points")
-    if not packed:
-        return _plain_las(laspy, path)
-    with tempfile.TemporaryDirectory() as scratch:
-        plain = Path(scratch) / "plain.las"
-        _unpack(path, plain, UNPACK_ROOM + UNPACK_COPIES * points * length)
-        return _plain_las(laspy, plain)
-
-
-def _unpack(path: Path, plain: Path, memory: int) -> None:
-    """Write a LAZ file as LAS, in a process of its own: at some damages lazrs ends its process, or asks for all memory.
-
-    Raises
-    ------
-    CaptureError
-        If it cannot be unpacked.
-    """
-    command = [sys.executable, "-P", "-c", UNPACK, str(path), str(plain), str(memory)]
-    done = subprocess.run(
-        command, stdin=subprocess.DEVNULL, capture_output=True, env=os.environ | UNPACK_THREADS, check=False
-    )
-    if done.returncode == 0:
-        return
-    lines = done.stderr.decode("utf-8", "replace").strip().splitlines()
-    reason = lines[-1].strip() if lines else f"lazrs ended with {done.returncode}"
-    raise capture_error(path, "file", reason, "it is damaged: copy or export it again")
-
-
-def _plain_las(laspy: ModuleType, path: Path) -> RawCloud:
-    with laspy.open(path) as file:
-        check_count(file.header.point_count, path, "points")
-        las = file.read()
+    las = read_laz(laspy, path) if packed else laspy.read(path)
     names = {name.lower(): name for name in las.point_format.dimension_names}
-    points = np.stack([np.asarray(las.x), np.asarray(las.y), np.asarray(las.z)], axis=1).astype(float)
+    xyz = np.stack([np.asarray(las.x), np.asarray(las.y), np.asarray(las.z)], axis=1).astype(float)
     normals = _columns(las, names, (("normalx", "normaly", "normalz"), ("nx", "ny", "nz")))
     colours = _columns(las, names, (("red", "green", "blue"),))
-    return RawCloud(points, normals, None if colours is None else bytes_of(colours))
+    return RawCloud(xyz, normals, None if colours is None else bytes_of(colours))
 
 
 def _columns(las, names: dict[str, str], choices: tuple[tuple[str, ...], ...]) -> np.ndarray | None:
