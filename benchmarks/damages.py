@@ -119,7 +119,7 @@ def damaged_kept(data: bytes, chance: random.Random) -> bytes:
 
 
 def damaged_laz(data: bytes, chance: random.Random) -> bytes:
-    """A LAZ file, every other one only where lazrs reads: how points are packed, the table of chunks, and the points."""
+    """A LAZ file, every other one only where lazrs reads: how points are packed, the table of chunks, the points."""
     if chance.random() < 0.5:
         return damaged(data, chance)
     start = data.index(b"laszip encoded")
@@ -129,8 +129,8 @@ def damaged_laz(data: bytes, chance: random.Random) -> bytes:
     return data[:start] + rest
 
 
-# ASTM E2807: 48 bytes of header, of which these are the length of the file, and where its XML begins and how long it is;
-# then binary sections, then XML, all in pages of 1020 bytes and a check sum of four.
+# ASTM E2807: 48 bytes of header, among them the length of the file, where its XML begins and how long it is; then
+# binary sections, then XML, all in pages of 1020 bytes and a check sum of four.
 _HEAD = "<8sIIQQQQ"
 _PAGE, _CONTENT = 1024, 1020
 _E57_TYPES = (b"Integer", b"ScaledInteger", b"Float", b"String", b"Blob", b"Structure", b"Vector", b"CompressedVector")

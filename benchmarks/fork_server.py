@@ -1,7 +1,7 @@
-"""What `laz._run_unpack` does, in forks of one small process that has lazrs loaded: some 10 ms instead of 40 an input.
+"""What `laz._run_unpack` does, in forks of one small process that has lazrs loaded.
 
-The server reads one line of JSON a task, forks, and answers with a line: the child's exit code and what it said. The same
-UNPACK is run, with the same arguments, standard input and limit of memory, in a process that nothing else happens in.
+The server reads one line of JSON a task, forks, and answers with a line: the child's exit code and what it said. The
+same UNPACK is run, with the same arguments, standard input and limit of memory, in a process of its own.
 """
 
 from __future__ import annotations

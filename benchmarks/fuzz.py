@@ -71,7 +71,7 @@ def parsers() -> list[Parser]:
         return read_las(path)
 
     def kept(path: Path) -> object:
-        return read_kept(path.parent, "capture")
+        return read_kept(path.parent, path.name.split("-")[0])
 
     return [
         Parser("COLMAP text", ("text/cameras.txt", "text/images.txt"), by_name),
@@ -92,7 +92,7 @@ def parsers() -> list[Parser]:
         Parser("image headers", ("a.jpg", "a.png", "a.tif"), by_name),
         Parser("model.json", ("model.json",), read_model),
         Parser("manifest", (".kerfwright.json",), _read_manifest),
-        Parser("kept stage", (".cache/capture-0",), kept, damaged_kept),
+        Parser("kept stage", (".cache/capture-0", ".cache/identify-0"), kept, damaged_kept),
         Parser("config.toml", ("config.toml",), read_config),
         *_option_parsers(),
     ]  # fmt: skip
@@ -116,6 +116,21 @@ def _option_parsers() -> list[Parser]:
     ]
 
 
+def _parts() -> object:
+    """A result of identification with all that a kept stage may hold: arrays in pieces, polygons, paths, numbers."""
+    import numpy as np
+    from shapely.geometry import Polygon
+
+    from kerfwright.identify.types import Parts, Primitive, Sheet
+    from kerfwright.model import Quantity
+
+    idx = np.arange(8)[::2]
+    hole = Polygon([(0, 0), (9, 0), (9, 9)], [[(5, 1), (6, 2), (6, 1)]])
+    sheet = Sheet("s", np.eye(4), Quantity(value=18), True, hole, idx, idx, idx)
+    plane = Primitive("plane", np.eye(3)[0], 1.0, idx, np.zeros(3), 0.1)
+    return Parts((sheet,), (plane,), 0.1, notes=("a note",), selection={"gap": np.float64(0), "at": Path("a/b.jpg")})
+
+
 def in_child(work: Callable[[], object]) -> None:
     """Do it in a child, which takes its libraries along when it ends: small processes are forked more quickly."""
     child = os.fork()
@@ -134,6 +149,8 @@ def write_all_samples(folder: Path) -> None:
     """Whole files of all parsers."""
     import pickle
 
+    import numpy as np
+
     from kerfwright.capture.types import Cloud
     from kerfwright.config import default_config
     from kerfwright.model import write_model
@@ -147,10 +164,9 @@ def write_all_samples(folder: Path) -> None:
     write_model(stool(), folder / "model.json")
     (folder / ".kerfwright.json").write_text('{"program": "kerfwright", "files": {"a/b.dxf": "00", "run.json": null}}')
     (folder / ".cache").mkdir()
-    import numpy as np
-
-    data = pickle.dumps(Cloud(np.eye(3), np.eye(3)), protocol=5)
-    (folder / ".cache" / "capture-0").write_bytes(sha256(data).digest() + data)
+    for name, result in (("capture", Cloud(np.eye(3), np.eye(3))), ("identify", _parts())):
+        data = pickle.dumps(result, protocol=5)
+        (folder / ".cache" / f"{name}-0").write_bytes(sha256(data).digest() + data)
     (folder / "config.toml").write_text(default_config())
     for name, value in (
         ("length", "top:x=420mm;leg one:z=.75in"), ("markers", "4x4_50:40mm"), ("stock", "12,18,1/2in"),

@@ -168,3 +168,50 @@ def test_names_in_a_stranger_s_cache_are_told_in_one_line(tmp_path):
     with pytest.raises(OutputError) as caught:
         read_kept(tmp_path, "capture")
     assert str(caught.value).isprintable()
+
+
+def forged(callable_, arguments, state):
+    """A pickle of what the callable makes, with another state."""
+
+    class Forged:
+        def __reduce__(self):
+            return callable_, arguments, state
+
+    return pickle.dumps(Forged(), protocol=5)
+
+
+@pytest.mark.parametrize(
+    ("thing", "arguments", "state"),
+    [
+        (np.dtype, ("f8", False, True), (3, "N", None, -1, -1, 0)),  # NumPy reads past the end of it: SIGSEGV
+        (np.dtype, ("f8", False, True), (3, "<", None, None, None, 1 << 40, 1, 0)),
+        (np.dtype, ("V8", False, True), (3, "|", None, ("a",), {"a": (np.dtype("f8"), 1 << 40)}, 8, 1, 0)),
+        (Camera, ("PINHOLE", 4, 3, (5.0, 5.0, 2.0, 1.5)), None),
+        (frozenset, ((),), {"a": 1}),
+    ],
+)
+def test_states_that_are_not_those_of_plain_things_are_refused(tmp_path, thing, arguments, state):
+    data = forged(thing, arguments, state)
+    (tmp_path / "capture-0").write_bytes(hashlib.sha256(data).digest() + data)
+    if state is None:
+        assert read_kept(tmp_path, "capture").model == "PINHOLE", "without a state it is a plain thing"
+        return
+    with pytest.raises(OutputError, match="not what kerfwright keeps there"):
+        read_kept(tmp_path, "capture")
+
+
+def test_functions_are_given_no_state():
+    body = b"cnumpy._core.numeric\n_frombuffer\n}S'__doc__'\nS'x'\nsb."
+    with pytest.raises(OutputError, match="function: not what"):
+        cache_module._Unpickler(cache_module.io.BytesIO(body)).load()
+
+
+@pytest.mark.parametrize("kind", ["<f8", "<i8", "<i4", "|u1", "|b1", "<U3", "|S2"])
+def test_arrays_of_plain_things_are_kept(tmp_path, kind):
+    """Also those that are not in one piece, of which NumPy writes another pickle."""
+    whole = np.arange(12).reshape(3, 4).astype(kind)
+    stage = Counter([whole, whole[:, ::2], whole[:0], whole[0, 0]])
+    run(tmp_path, {"a": stage})
+    back = StageCache(tmp_path, lambda: "b").get("a", ("path",), stage)[0]
+    assert stage.runs == 1 and all(np.array_equal(a, b) for a, b in zip(back, stage.result, strict=True))
+    assert [b.dtype.str for b in back[:3]] == [kind] * 3 and isinstance(back[3], np.generic)

@@ -1,7 +1,7 @@
 """Unpack the points of LAZ files in a process of its own.
 
-At some damages lazrs, the library that unpacks, ends its process, or asks for all memory there is. The child loads lazrs
-and nothing else, so that it costs no more than starting Python does; laspy reads the header here.
+At some damages lazrs, the library that unpacks, ends its process, or asks for all memory there is. The child loads
+lazrs and nothing else, so that it costs no more than starting Python does; laspy reads the header here.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from kerfwright.capture.parsing import capture_error
 
 __all__ = ["check_chunks", "read_laz"]
 
-# Argument 1 is the LAZ file, 2 where its points begin, 3 how many there are, 4 the file to write them to, 5 the memory that
-# may be used. The record of the header that tells how points are packed comes on standard input.
+# Argument 1 is the LAZ file, 2 where its points begin, 3 how many there are, 4 the file to write them to, 5 the memory
+# that may be used. The record of the header that tells how points are packed comes on standard input.
 UNPACK = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[5]),) * 2)
@@ -87,12 +87,17 @@ def _unpacked(path: Path, header: Any, record: bytes, plain: Path) -> np.ndarray
     memory = UNPACK_ROOM + path.stat().st_size + UNPACK_COPIES * count * length
     code, said = _run_unpack([str(v) for v in (path, header.offset_to_point_data, count, plain, memory)], record)
     if code != 0:
-        lines = said.decode("utf-8", "replace").strip().splitlines()
-        reason = f"lazrs ended with {Signals(-code).name}" if code < 0 else lines[-1].strip() if lines else "no reason told"
-        raise capture_error(path, "file", reason, REMEDY)
+        raise capture_error(path, "file", _reason(code, said), REMEDY)
     if plain.stat().st_size != count * length:
         raise capture_error(path, "packing", f"{plain.stat().st_size} bytes, {count} points of {length}", REMEDY)
     return np.fromfile(plain, header.point_format.dtype())
+
+
+def _reason(code: int, said: bytes) -> str:
+    if code < 0:
+        return f"lazrs ended with {Signals(-code).name}"
+    lines = said.decode("utf-8", "replace").strip().splitlines()
+    return lines[-1].strip() if lines else f"lazrs ended with {code}"
 
 
 def _run_unpack(arguments: Sequence[str], record: bytes) -> tuple[int, bytes]:
