@@ -25,11 +25,11 @@ from shapely.geometry import LineString, Polygon
 from tables import markdown
 
 from kerfwright.assemble.splits import find_seam_lines
-from kerfwright.assemble.visibility import Obstacles
 from kerfwright.capture import Camera, Capture, Cloud
 from kerfwright.capture.frame import moved, similarity
 from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.types import Sheet
+from kerfwright.identify.visibility import Obstacles
 from kerfwright.model import Board, Model, Quantity, Scale
 from kerfwright.model.frames import matrix
 from kerfwright.model.geometry import path_polygon

@@ -8,7 +8,7 @@ from clouds import pose, sheet, turned
 from kerfwright.assemble import AssembleOptions
 from kerfwright.assemble.constraints import constraint_segments
 from kerfwright.assemble.decided import Decided
-from kerfwright.assemble.joints import Joint, Search, end_on, face_plane, trace_of
+from kerfwright.identify.joints import Joint, Search, end_on, face_plane, trace_of
 from kerfwright.model import ContactEvidence
 
 D = 400.0

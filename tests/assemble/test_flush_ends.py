@@ -5,8 +5,8 @@ import pytest
 
 from clouds import pose, sheet
 from kerfwright.assemble.flush_ends import flush_end
-from kerfwright.assemble.joints import Search, end_on
 from kerfwright.capture.types import Cloud
+from kerfwright.identify.joints import Search, end_on
 
 T, LEAN = 15.0, np.radians(10)
 ALONG = np.array([np.sin(LEAN), np.cos(LEAN), 0])  # of the board that stops

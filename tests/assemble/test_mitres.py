@@ -11,12 +11,12 @@ from clouds import box_cloud, cloud_only, pose, sheet
 from kerfwright.assemble import AssembleOptions, contacts
 from kerfwright.assemble.constraints import constraint_segments
 from kerfwright.assemble.contacts import find_contacts, to_contact
-from kerfwright.assemble.joints import Search, end_on
 from kerfwright.assemble.mitres import EndFace, corner_lines, look_for_mitre, mitred, overlapping
-from kerfwright.assemble.seams import Seam
 from kerfwright.assemble.snap import moved_with
 from kerfwright.identify.freespace import FreeSpace
+from kerfwright.identify.joints import Search, end_on
 from kerfwright.identify.photo_edges import Photos
+from kerfwright.identify.seams import Seam
 from painted import Painted, nothing_hides
 
 T, D = 15.0, 300.0

@@ -8,8 +8,8 @@ from clouds import pose, sheet
 from kerfwright.assemble import AssembleOptions
 from kerfwright.assemble.constraints import constraint_segments
 from kerfwright.assemble.decided import Decided
-from kerfwright.assemble.joints import Search, end_on, face_plane
 from kerfwright.assemble.severing import severed_share, without_severing
+from kerfwright.identify.joints import Search, end_on, face_plane
 from kerfwright.model import ContactEvidence
 
 T = 20.0

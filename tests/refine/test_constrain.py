@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from shapely.geometry import Polygon, box
 
-from kerfwright.assemble.outlines import constrained_region
 from kerfwright.assemble.types import ConstraintSegment
+from kerfwright.identify.outlines import constrained_region
 from kerfwright.refine.constrain import outline_region, to_loops
 from kerfwright.refine.types import BoundaryLoop, Outline
 

@@ -8,8 +8,8 @@ from shapely import affinity
 from shapely.geometry import Polygon, box
 
 from clouds import pose, sheet
-from kerfwright.assemble.outlines import segment_axes
 from kerfwright.assemble.types import ConstraintSegment
+from kerfwright.identify.outlines import segment_axes
 from kerfwright.model.geometry import mirror_path, path_polygon, sample_loop, transform_path
 from kerfwright.refine import BoundaryLoop
 from kerfwright.refine.boards import to_boards

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kerfwright.assemble.visibility import Obstacles
+from kerfwright.identify.visibility import Obstacles
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,11 +23,11 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
 
     Raises StageError when the alignment does not converge.
     """
-    from kerfwright.assemble.align import align_sheets
     from kerfwright.assemble.contacts import to_contact
     from kerfwright.assemble.depths import remeasured
     from kerfwright.assemble.laid import laid_contacts
     from kerfwright.assemble.veils import still_open
+    from kerfwright.identify.align import align_sheets
     from kerfwright.identify.freespace import see_through
     from kerfwright.identify.photo_edges import Photos
 
@@ -57,7 +57,7 @@ def _whole(
     from kerfwright.assemble.crossings import crossings_settled
     from kerfwright.assemble.rags import pieced_together
     from kerfwright.assemble.veils import unveiled
-    from kerfwright.assemble.visibility import Obstacles
+    from kerfwright.identify.visibility import Obstacles
 
     sheets = pieced_together(sheets, cloud, free, options)
     sheets = crossings_settled(sheets, cloud, photos, Obstacles(sheets, options.outline_error * cloud.diameter))
@@ -71,9 +71,9 @@ def _with_hidden_faces(
     from kerfwright.assemble.backs import measured_backs
     from kerfwright.assemble.covered import backed_by_ends
     from kerfwright.assemble.flush import flush_neighbours
-    from kerfwright.assemble.gaps import mended
     from kerfwright.assemble.laid import laid_on
     from kerfwright.assemble.stock import share_thickness
+    from kerfwright.identify.gaps import mended
 
     sheets = measured_backs(sheets, photos, cloud.diameter, options)
     sheets = backed_by_ends(mended(sheets, cloud, free, options), cloud.diameter, options)
@@ -121,7 +121,7 @@ def _run_on(
 ) -> tuple[Sheet, ...]:
     """The sheets with their regions run on to what they end on: what stereo lost in the dark between them comes back.
     """
-    from kerfwright.assemble.outlines import filled_region
+    from kerfwright.identify.outlines import filled_region
 
     known = [tuple(s for s in segments if s.origin in ("contact", "ground")) for segments in constraints]
     return tuple(

@@ -8,9 +8,9 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from kerfwright.assemble.joints import face_plane, trace_of
-from kerfwright.assemble.outlines import largest_piece
 from kerfwright.assemble.types import Assembly
+from kerfwright.identify.joints import face_plane, trace_of
+from kerfwright.identify.outlines import largest_piece
 from kerfwright.identify.types import Sheet
 
 __all__ = ["kept_apart"]

@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kerfwright.assemble.joints import Joint, columns, face_plane, trace_of
 from kerfwright.assemble.options import AssembleOptions
-from kerfwright.assemble.seams import sweep_line
 from kerfwright.assemble.stock import with_thickness
-from kerfwright.assemble.visibility import Obstacles
+from kerfwright.identify.joints import Joint, columns, face_plane, trace_of
 from kerfwright.identify.photo_edges import Photos, SweepResult, refine_peak
+from kerfwright.identify.seams import sweep_line
 from kerfwright.identify.types import Sheet
+from kerfwright.identify.visibility import Obstacles
 from kerfwright.model import Origin, Quantity
 
 __all__ = ["measured_backs"]

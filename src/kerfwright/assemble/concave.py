@@ -12,8 +12,8 @@ from itertools import pairwise
 import numpy as np
 from shapely.geometry import LineString, Polygon
 
-from kerfwright.assemble.outlines import largest_piece
 from kerfwright.assemble.splits import SeamLine, SeamSearch
+from kerfwright.identify.outlines import largest_piece
 
 __all__ = ["find_inner_seams", "inner_corners"]
 

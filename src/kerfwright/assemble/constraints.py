@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from kerfwright.assemble.decided import Decided
-from kerfwright.assemble.joints import Joint, Trace, columns, face_plane, runs_of, trace_of
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.assemble.severing import severs
 from kerfwright.assemble.types import ConstraintSegment
+from kerfwright.identify.joints import Joint, Trace, columns, face_plane, runs_of, trace_of
 from kerfwright.identify.types import Sheet
 
 __all__ = ["constraint_segments"]

@@ -4,63 +4,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-import shapely
-from scipy.spatial import cKDTree
 
 from kerfwright.assemble.decided import Decided, swapped
 from kerfwright.assemble.flush_ends import flush_end
-from kerfwright.assemble.joints import Joint, Search, end_on, face_plane
 from kerfwright.assemble.mitres import EndFace, corner_lines, look_for_mitre, mitred, overlapping
 from kerfwright.assemble.options import AssembleOptions
-from kerfwright.assemble.seams import End, Seam, look_for_end, look_for_seam
 from kerfwright.assemble.severing import without_severing
-from kerfwright.assemble.visibility import Obstacles
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.freespace import FreeSpace
+from kerfwright.identify.joints import Joint, end_on, face_plane
 from kerfwright.identify.photo_edges import Photos
+from kerfwright.identify.reaching import LEAST_VIEWS, Scene, end_is_seen, goes_on_unseen, shown_end
+from kerfwright.identify.seams import Seam, look_for_seam
 from kerfwright.identify.types import Sheet
+from kerfwright.identify.visibility import Obstacles
 from kerfwright.model import Contact, ContactEvidence
 
 __all__ = ["find_contacts", "to_contact"]
 
 LEAST_SEAM = 1.35  # a visible seam is at least this much stronger than the face beside it
-AS_CLEAR = 0.8  # of the score of the edge at the plane
-LEAST_VIEWS = 3  # photographs that must show an edge for it to decide anything
-MOST_SPOILT = 0.3  # of a gap may be seen through, or taken by another board
 LEAST_SHARE = 0.25  # of the length of a corner's other joint; a shorter one is a ragged outline
 CLEAR_MARGIN = 1.25  # ratio of seam scores from which a corner counts as decided by the photographs
 OPEN_SEAM = 1.8  # below this the seam of a butt joint does not rule out that a corner is mitred as its twins are
 LEAST_MITRE = 1.7  # strength of a mitre's seam on an end face; butt joints show up to 1.6 there
 MITRE_MARGIN = 1.3  # ... over the seams of butt joints
 MITRE_VIEWS = 6  # an end face is small: fewer photographs of it say nothing
-
-
-@dataclass(frozen=True, eq=False)
-class _Scene:
-    sheets: tuple[Sheet, ...]
-    cloud: Cloud
-    photos: Photos
-    obstacles: Obstacles
-    free: FreeSpace
-    options: AssembleOptions
-
-    @property
-    def diameter(self) -> float:
-        return self.cloud.diameter
-
-    def mm(self, fraction: float) -> float:
-        return fraction * self.diameter
-
-    def search(self, cover: float) -> Search:
-        """Where joints are looked for when a's wood may go on so far (a fraction of D) beyond its outline."""
-        o = self.options
-        return Search(
-            self.mm(o.far_reach), self.mm(o.outline_error), self.mm(cover), self.mm(1 / 200), self.mm(o.min_contact),
-            self.mm(o.ragged),
-        )
 
 
 def find_contacts(
@@ -73,13 +44,13 @@ def find_contacts(
         less was known that could hide their seams, and a board that was run on to another still ends there.
     """
     settled = {frozenset((d.joint.a, d.joint.b)): d for d in earlier if d.kind in (2, 4)}
-    scene = _Scene(sheets, cloud, photos, Obstacles(sheets, options.outline_error * cloud.diameter), free, options)
+    scene = Scene(sheets, cloud, photos, Obstacles(sheets, options.outline_error * cloud.diameter), free, options)
     near, far, doubtful = _all_joints(scene, {(d.joint.a, d.joint.b) for d in earlier if d.kind == 1})
     found: list[Decided] = []
     for a in range(len(sheets)):
         for b in range(a + 1, len(sheets)):
             keys = ((a, b), (b, a))
-            either = [near.get(key) or _unfinished(scene, far.get(key)) for key in keys]
+            either = [near.get(key) or goes_on_unseen(scene, far.get(key)) for key in keys]
             either = [one or (doubtful.get(key) if other and key[::-1] not in near else None)
                       for key, one, other in zip(keys, either, either[::-1], strict=True)]
             if all(either) and any(key in near or key in doubtful for key in keys):
@@ -93,7 +64,7 @@ def find_contacts(
     return [_with_flush_end(scene, d) for d in found]
 
 
-def _with_flush_end(scene: _Scene, d: Decided) -> Decided:
+def _with_flush_end(scene: Scene, d: Decided) -> Decided:
     """A contact with what the cloud shows of a slanted end beside it; at corners the end is flush anyway."""
     if d.kind != 1:
         return d
@@ -103,7 +74,7 @@ def _with_flush_end(scene: _Scene, d: Decided) -> Decided:
 _Joints = dict[tuple[int, int], Joint]
 
 
-def _all_joints(scene: _Scene, known: set[tuple[int, int]]) -> tuple[_Joints, _Joints, _Joints]:
+def _all_joints(scene: Scene, known: set[tuple[int, int]]) -> tuple[_Joints, _Joints, _Joints]:
     """Joints by (a, b): near ones, those further apart, and those where a's wood is not seen but may be. Those `known`
     are not asked for a seam again.
     """
@@ -126,73 +97,13 @@ def _all_joints(scene: _Scene, known: set[tuple[int, int]]) -> tuple[_Joints, _J
     return near, far, doubtful
 
 
-def _end_is_seen(scene: _Scene, joint: Joint) -> bool:
-    """Whether cut-face points that look towards a show where b really ends: then it does not reach a."""
-    b = scene.sheets[joint.b]
-    if joint.gap < scene.mm(scene.options.end_offset) or not len(b.cut_idx):
-        return False
-    facing = scene.cloud.normals[b.cut_idx] @ b.world_from_board[:3, :2] @ -joint.trace.m > 0.7
-    places = b.to_board(scene.cloud.points[b.cut_idx[facing]])[:, :2]
-    if len(places) < 5:
-        return False
-    distance, _ = cKDTree(places).query(joint.ends)
-    return float((distance < scene.mm(scene.options.end_offset) * 2).mean()) > 0.5
-
-
-def _unfinished(scene: _Scene, joint: Joint | None) -> Joint | None:
-    """A far joint whose board just fades out: no cut face ends it, nobody saw through the gap, and the photographs show
-    an edge at the plane, or nothing.
-    """
-    options = scene.options
-    if joint is None or joint.gap > scene.mm(options.unseen_reach) or joint.length < scene.mm(options.reach):
-        return None
-    if _end_is_seen(scene, joint) or _gap_is_free(scene, joint) or _gap_is_taken(scene, joint):
-        return None
-    end = _end(scene, joint)
-    if end is None or end.views < LEAST_VIEWS:
-        return joint
-    return None if end.excess < options.end_excess / 2 or _ends_before(scene, joint, end) else joint
-
-
-def _gap_is_free(scene: _Scene, joint: Joint) -> bool:
-    """Whether cameras saw through the place between b's outline and the plane."""
-    return float((scene.free.votes(_gap_places(scene, joint)) >= 2).mean()) > MOST_SPOILT
-
-
-def _gap_is_taken(scene: _Scene, joint: Joint) -> bool:
-    """Whether another board lies between b's outline and the plane: it fills much of the gap, or goes right across it,
-    however thin it is.
-    """
-    others = [sheet for k, sheet in enumerate(scene.sheets) if k not in (joint.a, joint.b)]
-    thinnest = min((sheet.thickness.value for sheet in others), default=np.inf)
-    steps = int(np.clip(2 * joint.gap / thinnest, 4, 200))
-    places = _gap_places(scene, joint, (np.arange(steps) + 0.5) / steps)
-    taken = np.zeros(len(places), bool)
-    for sheet in others:
-        x = sheet.to_board(places)
-        inside = (x[:, 2] > 0) & (x[:, 2] < sheet.thickness.value)
-        taken[inside] |= shapely.contains_xy(sheet.region, x[inside, 0], x[inside, 1])
-    taken = taken.reshape(steps, -1)  # from the plane to the outline
-    crossed = (taken[1:] & np.logical_or.accumulate(~taken[:-1])).any(axis=0)
-    return max(float(taken.mean()), float(crossed.mean())) > MOST_SPOILT
-
-
-def _gap_places(scene: _Scene, joint: Joint, shares: Sequence[float] = (0.2, 0.4, 0.6, 0.8)) -> np.ndarray:
-    """Places (N, 3) in the part of b that nobody saw, world, at some shares of the way from the plane."""
-    b = scene.sheets[joint.b]
-    inside, along = joint.trace.coordinates(joint.ends)
-    layers = [joint.trace.place(share * inside, along) for share in shares]
-    heights = b.thickness.value * np.array([0.3, 0.7])
-    return b.to_world(np.concatenate([np.c_[xy, np.full(len(xy), z)] for xy in layers for z in heights]))
-
-
-def _is_contact(scene: _Scene, joint: Joint, reverse: Joint | None) -> bool:
+def _is_contact(scene: Scene, joint: Joint, reverse: Joint | None) -> bool:
     """A near joint counts when it is long enough and, where photographs show its line, they show an edge there.
 
     A board whose outline covers the other's thickness stops there only if its outer face shows a seam, or the other may
     stop instead.
     """
-    if joint.length < scene.mm(scene.options.reach) or _end_is_seen(scene, joint):
+    if joint.length < scene.mm(scene.options.reach) or end_is_seen(scene, joint):
         return False
     overlapping = joint.gap < -0.5 * scene.sheets[joint.a].thickness.value
     if overlapping and reverse is not None:
@@ -202,42 +113,19 @@ def _is_contact(scene: _Scene, joint: Joint, reverse: Joint | None) -> bool:
     return not shown or max(s.score for s in shown) > LEAST_SEAM
 
 
-def _seam(scene: _Scene, joint: Joint, face: str) -> Seam:
+def _seam(scene: Scene, joint: Joint, face: str) -> Seam:
     return look_for_seam(scene.sheets, joint, face, scene.photos, scene.obstacles, scene.mm(1 / 300))
 
 
-def _confirmed(scene: _Scene, joint: Joint | None) -> Decided | None:
-    """A far joint that the photographs confirm: an edge at the plane, and no clearer one before it."""
-    if joint is None or joint.length < scene.mm(scene.options.reach):
-        return None
-    if _end_is_seen(scene, joint) or _gap_is_free(scene, joint) or _gap_is_taken(scene, joint):
-        return None
-    end = _end(scene, joint)
-    if end is None or end.views < LEAST_VIEWS:
-        return None
-    if end.excess < scene.options.end_excess or _ends_before(scene, joint, end):
+def _confirmed(scene: Scene, joint: Joint | None) -> Decided | None:
+    """A contact across a far joint that the photographs confirm."""
+    end = shown_end(scene, joint)
+    if joint is None or end is None:
         return None
     return Decided(joint, 1, None, ContactEvidence(seam_score=end.score, views=end.views, decided_by="seam"))
 
 
-def _end(scene: _Scene, joint: Joint) -> End | None:
-    window, fringe = scene.mm(scene.options.end_offset), scene.mm(scene.options.veil)
-    beside = scene.mm(scene.options.reach)
-    return look_for_end(scene.sheets, joint, scene.photos, scene.obstacles, window, fringe, beside)
-
-
-def _ends_before(scene: _Scene, joint: Joint, end: End) -> bool:
-    """Whether the photographs show an edge before the plane that is clear, and clearer than the one at the plane.
-
-    Where the outline stops, one as clear will do: lines behind the board run at the plane's height as well.
-    """
-    options = scene.options
-    clear = end.views >= LEAST_VIEWS and end.rival_excess > 2 * options.end_excess
-    here = abs(end.rival_offset - joint.gap) < scene.mm(options.veil)
-    return clear and end.rival_score > max(options.rival_score, end.score * (AS_CLEAR if here else 1.0))
-
-
-def _corner(scene: _Scene, first: Joint, second: Joint, before: Decided | None) -> Decided:
+def _corner(scene: Scene, first: Joint, second: Joint, before: Decided | None) -> Decided:
     """Which of two boards stops: the one whose joint is far longer, or else whose outer face shows the seam."""
     if before is not None:
         joints = (first, second) if before.joint.b == first.b else (second, first)
@@ -258,7 +146,7 @@ def _corner(scene: _Scene, first: Joint, second: Joint, before: Decided | None) 
     return _mitre(scene, corner, "seam") if seams[chosen].score < LEAST_SEAM and _shows_mitre(corner) else corner
 
 
-def _end_face(scene: _Scene, first: Joint, second: Joint, seams: list[Seam]) -> EndFace | None:
+def _end_face(scene: Scene, first: Joint, second: Joint, seams: list[Seam]) -> EndFace | None:
     """What the end faces show of a corner that may be a mitre: both boards reach its outer line, and both outer faces
     were seen without a strong seam of a butt joint.
     """
@@ -276,7 +164,7 @@ def _shows_mitre(corner: Decided) -> bool:
     return face.mitre >= LEAST_MITRE and face.mitre >= MITRE_MARGIN * face.butt
 
 
-def _mitre(scene: _Scene, corner: Decided, decided_by: str) -> Decided:
+def _mitre(scene: Scene, corner: Decided, decided_by: str) -> Decided:
     """The corner as a mitre, with the score of its seam and the best one of a butt joint."""
     face = corner.mitre
     evidence = ContactEvidence(
@@ -287,7 +175,7 @@ def _mitre(scene: _Scene, corner: Decided, decided_by: str) -> Decided:
     return Decided(joint, 4, other, evidence, face)
 
 
-def _outer_face(scene: _Scene, joint: Joint) -> str:
+def _outer_face(scene: Scene, joint: Joint) -> str:
     """The face of b on the outer side of the corner: the one away from a's bulk."""
     b = scene.sheets[joint.b]
     middle = b.to_board(scene.sheets[joint.a].to_world(_middle(scene.sheets[joint.a])))[0, 2]
@@ -299,7 +187,7 @@ def _middle(sheet: Sheet) -> np.ndarray:
     return np.array([[centre.x, centre.y, sheet.thickness.value / 2]])
 
 
-def _like_their_twins(scene: _Scene, found: list[Decided]) -> list[Decided]:
+def _like_their_twins(scene: Scene, found: list[Decided]) -> list[Decided]:
     """Corners that the photographs leave open are decided as the corners between boards of the same sizes are; one that
     may be a mitre follows mitres before butt joints with faint seams.
     """
@@ -319,16 +207,16 @@ def _like_their_twins(scene: _Scene, found: list[Decided]) -> list[Decided]:
     return out
 
 
-def _votes(scene: _Scene, corner: Decided, others: list[Decided]) -> int:
+def _votes(scene: Scene, corner: Decided, others: list[Decided]) -> int:
     """How many contacts there are between boards of the same sizes, whichever ends on which."""
     return sum(_alike_either_way(scene, corner, other) for other in others)
 
 
-def _alike_either_way(scene: _Scene, one: Decided, other: Decided) -> bool:
+def _alike_either_way(scene: Scene, one: Decided, other: Decided) -> bool:
     return any(_alike(scene, joint, other.joint) for joint in (one.joint, one.other))
 
 
-def _alike(scene: _Scene, one: Joint, other: Joint) -> int:
+def _alike(scene: Scene, one: Joint, other: Joint) -> int:
     """1 when the boards of two joints have the same sizes in the same roles."""
     sheets = scene.sheets
     return int(_same_size(sheets[one.a], sheets[other.a]) and _same_size(sheets[one.b], sheets[other.b]))

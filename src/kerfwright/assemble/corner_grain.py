@@ -14,9 +14,9 @@ import shapely
 from scipy.ndimage import gaussian_filter
 from shapely.geometry import Polygon
 
-from kerfwright.assemble.visibility import Obstacles
 from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.types import Sheet
+from kerfwright.identify.visibility import Obstacles
 
 __all__ = ["grain_kind"]
 

@@ -13,9 +13,9 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, MultiPoint, Polygon
 
-from kerfwright.assemble.joints import Trace, face_plane, trace_of
 from kerfwright.assemble.options import AssembleOptions
-from kerfwright.assemble.outlines import largest_piece
+from kerfwright.identify.joints import Trace, face_plane, trace_of
+from kerfwright.identify.outlines import largest_piece
 from kerfwright.identify.types import Sheet
 
 __all__ = ["backed_by_ends", "end_sections"]

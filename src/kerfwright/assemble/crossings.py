@@ -15,12 +15,12 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from kerfwright.assemble.coplanar import in_one_plane, moved_region, with_own_points
-from kerfwright.assemble.outlines import largest_piece
-from kerfwright.assemble.visibility import Obstacles
 from kerfwright.capture.types import Cloud
+from kerfwright.identify.coplanar import in_one_plane, moved_region, with_own_points
+from kerfwright.identify.outlines import largest_piece
 from kerfwright.identify.photo_edges import Photos, SweepResult, sweep_edge
 from kerfwright.identify.types import Sheet
+from kerfwright.identify.visibility import Obstacles
 
 __all__ = ["crossings_settled"]
 

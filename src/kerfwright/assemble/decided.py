@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from kerfwright.assemble.joints import Joint
 from kerfwright.assemble.mitres import EndFace
+from kerfwright.identify.joints import Joint
 from kerfwright.model import ContactEvidence
 
 __all__ = ["Decided", "swapped"]

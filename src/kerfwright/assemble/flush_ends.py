@@ -7,8 +7,8 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from kerfwright.assemble.joints import Joint, Trace, face_plane, trace_of
 from kerfwright.capture.types import Cloud
+from kerfwright.identify.joints import Joint, Trace, face_plane, trace_of
 from kerfwright.identify.types import Sheet
 
 __all__ = ["flush_end", "flush_trace"]

@@ -12,11 +12,11 @@ import numpy as np
 import shapely
 from shapely.geometry import MultiPolygon, Polygon
 
-from kerfwright.assemble.coplanar import moved_region
-from kerfwright.assemble.joints import face_plane
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.capture.types import Cloud
+from kerfwright.identify.coplanar import moved_region
 from kerfwright.identify.freespace import FreeSpace
+from kerfwright.identify.joints import face_plane
 from kerfwright.identify.types import Sheet
 from kerfwright.model import Contact, ContactEvidence, Origin
 

@@ -13,10 +13,10 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from kerfwright.assemble.joints import Joint, face_plane, trace_of
-from kerfwright.assemble.visibility import Obstacles
+from kerfwright.identify.joints import Joint, face_plane, trace_of
 from kerfwright.identify.photo_edges import Photos, sweep_edge
 from kerfwright.identify.types import Sheet
+from kerfwright.identify.visibility import Obstacles
 
 __all__ = ["CornerLines", "EndFace", "corner_lines", "look_for_mitre", "mitred", "overlapping"]
 

@@ -16,13 +16,13 @@ import shapely
 from scipy.spatial import cKDTree
 from shapely.geometry import Polygon
 
-from kerfwright.assemble.coplanar import in_one_plane, moved_region
 from kerfwright.assemble.covered import end_sections
-from kerfwright.assemble.gaps import is_seen, is_thin, places_in, usual_density
 from kerfwright.assemble.options import AssembleOptions
-from kerfwright.assemble.outlines import largest_piece
 from kerfwright.capture.types import Cloud
+from kerfwright.identify.coplanar import in_one_plane, moved_region
 from kerfwright.identify.freespace import FreeSpace
+from kerfwright.identify.gaps import is_seen, is_thin, places_in, usual_density
+from kerfwright.identify.outlines import largest_piece
 from kerfwright.identify.types import Sheet
 
 __all__ = ["pieced_together"]

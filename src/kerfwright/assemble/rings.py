@@ -14,12 +14,12 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, Point, Polygon
 
-from kerfwright.assemble.coplanar import with_own_points
 from kerfwright.assemble.corner_grain import grain_kind
 from kerfwright.assemble.splits import SeamLine
-from kerfwright.assemble.visibility import Obstacles
+from kerfwright.identify.coplanar import with_own_points
 from kerfwright.identify.photo_edges import Photos, sweep_edge
 from kerfwright.identify.types import Sheet
+from kerfwright.identify.visibility import Obstacles
 
 __all__ = ["RingCorner", "chosen_seams", "find_ring_seams", "ring_corners", "split_ring"]
 

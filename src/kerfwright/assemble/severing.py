@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from kerfwright.assemble.decided import Decided, swapped
-from kerfwright.assemble.joints import Joint
+from kerfwright.identify.joints import Joint
 from kerfwright.identify.types import Sheet
 
 __all__ = ["severed_share", "severs", "without_severing"]

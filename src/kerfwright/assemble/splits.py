@@ -17,9 +17,9 @@ from shapely.geometry import LineString, Polygon
 from kerfwright.assemble.discontinuity import Discontinuity, discontinuity
 from kerfwright.assemble.texture import face_strips
 from kerfwright.assemble.types import ConstraintSegment
-from kerfwright.assemble.visibility import Obstacles
 from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.types import Sheet
+from kerfwright.identify.visibility import Obstacles
 from kerfwright.model import Contact, ContactEvidence
 
 __all__ = ["SeamLine", "SeamSearch", "find_seam_lines", "seam_contact", "seam_segments", "split_sheet"]

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from kerfwright.assemble.visibility import Obstacles
 from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.types import Sheet
+from kerfwright.identify.visibility import Obstacles
 
 __all__ = ["FaceStrips", "face_strips"]
 

@@ -13,15 +13,15 @@ import shapely
 from scipy.spatial import cKDTree
 from shapely.geometry import Polygon
 
-from kerfwright.assemble.joints import Joint, Trace, columns, face_plane, trace_of
 from kerfwright.assemble.options import AssembleOptions
-from kerfwright.assemble.outlines import largest_piece, segment_axes
-from kerfwright.assemble.seams import sweep_line
 from kerfwright.assemble.types import ConstraintSegment
-from kerfwright.assemble.visibility import Obstacles
 from kerfwright.capture.types import Cloud
+from kerfwright.identify.joints import Joint, Trace, columns, face_plane, trace_of
+from kerfwright.identify.outlines import largest_piece, segment_axes
 from kerfwright.identify.photo_edges import Photos
+from kerfwright.identify.seams import sweep_line
 from kerfwright.identify.types import Sheet
+from kerfwright.identify.visibility import Obstacles
 from kerfwright.parallel import each
 
 __all__ = ["still_open", "unveiled"]

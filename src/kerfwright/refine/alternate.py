@@ -12,8 +12,6 @@ from shapely.geometry import Polygon
 from kerfwright.assemble import AssembleOptions, assemble
 from kerfwright.assemble.apart import kept_apart
 from kerfwright.assemble.concave import find_inner_seams, inner_corners
-from kerfwright.assemble.coplanar import in_one_plane, moved_region, with_own_points
-from kerfwright.assemble.outlines import constrained_region, largest_piece
 from kerfwright.assemble.rings import find_ring_seams, split_ring
 from kerfwright.assemble.splits import (
     SeamLine,
@@ -24,11 +22,13 @@ from kerfwright.assemble.splits import (
     split_sheet,
 )
 from kerfwright.assemble.types import Assembly
-from kerfwright.assemble.visibility import Obstacles
 from kerfwright.capture.types import Capture
+from kerfwright.identify.coplanar import in_one_plane, moved_region, with_own_points
 from kerfwright.identify.freespace import see_through
+from kerfwright.identify.outlines import constrained_region, largest_piece
 from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.types import Parts, Sheet
+from kerfwright.identify.visibility import Obstacles
 from kerfwright.parallel import each
 from kerfwright.refine.constrain import outline_region
 from kerfwright.refine.options import RefineOptions

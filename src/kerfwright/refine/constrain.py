@@ -7,8 +7,8 @@ import shapely
 from scipy.spatial import cKDTree
 from shapely.geometry import Polygon
 
-from kerfwright.assemble.outlines import largest_piece, segment_axes
 from kerfwright.assemble.types import ConstraintSegment
+from kerfwright.identify.outlines import largest_piece, segment_axes
 from kerfwright.refine.types import BoundaryLoop, Outline
 
 __all__ = ["outline_region", "to_loops"]

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import binary_closing, binary_opening, uniform_filter1d
 
-from kerfwright.assemble.outlines import on_segments
 from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.capture.types import Cloud
+from kerfwright.identify.outlines import on_segments
 from kerfwright.identify.types import Sheet
 from kerfwright.refine.congruence import Contour, contour_of
 from kerfwright.refine.types import BoundaryLoop

@@ -8,10 +8,10 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
-from kerfwright.assemble.outlines import constrained_region
 from kerfwright.assemble.types import Assembly, ConstraintSegment
 from kerfwright.capture.types import Capture, Cloud
 from kerfwright.errors import StageError
+from kerfwright.identify.outlines import constrained_region
 from kerfwright.model import CutPath, Finding, Line, Loop
 from kerfwright.model.geometry import edge_length
 from kerfwright.refine.boards import to_boards

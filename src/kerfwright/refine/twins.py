@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from kerfwright.assemble.outlines import segment_axes
 from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.errors import StageError
+from kerfwright.identify.outlines import segment_axes
 from kerfwright.model import CutPath, Line
 from kerfwright.model.geometry import transform_path
 from kerfwright.refine.congruence import Contour, agree, best_motion, contour_of, moved_points

@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from kerfwright.assemble.outlines import on_segments
 from kerfwright.assemble.types import Assembly
+from kerfwright.identify.outlines import on_segments
 from kerfwright.refine.types import BoundaryLoop
 
 __all__ = ["less_sure_at_contacts"]

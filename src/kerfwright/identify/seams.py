@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kerfwright.assemble.joints import Joint
-from kerfwright.assemble.visibility import Obstacles
+from kerfwright.identify.joints import Joint
 from kerfwright.identify.photo_edges import Photos, SweepResult, sweep_edge
 from kerfwright.identify.types import Sheet
+from kerfwright.identify.visibility import Obstacles
 
 __all__ = ["End", "Seam", "look_for_end", "look_for_seam", "sweep_line"]
 

@@ -7,8 +7,8 @@ import pytest
 
 from clouds import sheet, turned
 from kerfwright.assemble import AssembleOptions
-from kerfwright.assemble.align import align_sheets
 from kerfwright.capture.types import Cloud
+from kerfwright.identify.align import align_sheets
 from kerfwright.identify.primitives import plane_fit
 
 OPTIONS = AssembleOptions()

@@ -6,14 +6,13 @@ Boundaries near a contact are dark or hidden and traced badly; what is known the
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from kerfwright.assemble.types import ConstraintSegment
-
-__all__ = ["constrained_region", "filled_region", "largest_piece", "on_segments", "segment_axes"]
+__all__ = ["Stretch", "constrained_region", "filled_region", "largest_piece", "on_segments", "segment_axes"]
 
 CRACK = 0.01  # mm
 ON_SEGMENT = 0.05  # mm; boundaries lie on their segments to rounding
@@ -21,9 +20,18 @@ SHALLOW = 0.12  # of the reach: how much deeper than usual a column may be and s
 TRACED_SHALLOW = 0.03  # ... of a traced outline above the floor: an arch begins there, which photographs show
 
 
-def constrained_region(
-    region: Polygon, segments: tuple[ConstraintSegment, ...], reach: float, beyond: float
-) -> Polygon:
+class Stretch(Protocol):
+    """A straight stretch that an outline must follow, board frame mm; the wood lies on the left of start -> end."""
+
+    @property
+    def start(self) -> np.ndarray: ...
+    @property
+    def end(self) -> np.ndarray: ...
+    @property
+    def origin(self) -> str: ...
+
+
+def constrained_region(region: Polygon, segments: Sequence[Stretch], reach: float, beyond: float) -> Polygon:
     """The traced region run on to each segment over its length (by at most `reach`) and cut off behind it (as far as
     `beyond`).
     """
@@ -35,7 +43,7 @@ def constrained_region(
 
 
 def filled_region(
-    region: Polygon, segments: tuple[ConstraintSegment, ...], reach: float, on_floor: float = SHALLOW
+    region: Polygon, segments: Sequence[Stretch], reach: float, on_floor: float = SHALLOW
 ) -> Polygon:
     """The region run on to each segment over its length, by at most `reach` mm; on the floor where it is no deeper than
     usual by more than the share `on_floor` of that.
@@ -52,7 +60,7 @@ def _closed(shape) -> Polygon:
     return shape.buffer(CRACK, join_style="mitre").buffer(-CRACK, join_style="mitre").simplify(CRACK / 2)
 
 
-def segment_axes(segment: ConstraintSegment) -> tuple[np.ndarray, np.ndarray, float]:
+def segment_axes(segment: Stretch) -> tuple[np.ndarray, np.ndarray, float]:
     """Unit direction, inward normal, length."""
     along = segment.end - segment.start
     length = float(np.linalg.norm(along))
@@ -60,7 +68,7 @@ def segment_axes(segment: ConstraintSegment) -> tuple[np.ndarray, np.ndarray, fl
     return along, np.array([-along[1], along[0]]), length
 
 
-def on_segments(points: np.ndarray, segments: Sequence[ConstraintSegment]) -> np.ndarray:
+def on_segments(points: np.ndarray, segments: Sequence[Stretch]) -> np.ndarray:
     """(N,) whether points lie on a segment."""
     on = np.zeros(len(points), bool)
     for segment in segments:
@@ -70,14 +78,14 @@ def on_segments(points: np.ndarray, segments: Sequence[ConstraintSegment]) -> np
     return on
 
 
-def _strip(segment: ConstraintSegment, low: float, high: float, widen: float) -> Polygon:
+def _strip(segment: Stretch, low: float, high: float, widen: float) -> Polygon:
     """Rectangle between two distances inside the segment."""
     along, inward, _ = segment_axes(segment)
     a, b = segment.start - widen * along, segment.end + widen * along
     return Polygon([a + low * inward, b + low * inward, b + high * inward, a + high * inward])
 
 
-def _filling(region: Polygon, segment: ConstraintSegment, reach: float, shallow: float) -> list[Polygon]:
+def _filling(region: Polygon, segment: Stretch, reach: float, shallow: float) -> list[Polygon]:
     """What lies between the segment and the region's nearest boundary, one polygon a run of columns.
 
     Columns that are deeper than most by over `shallow` are left alone: there the region ends beside the segment, not

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kerfwright.assemble.options import AssembleOptions
 from kerfwright.capture.types import Cloud
 from kerfwright.errors import StageError
+from kerfwright.identify.options import WholeOptions
 from kerfwright.identify.primitives import plane_fit
 from kerfwright.identify.types import Sheet
 
@@ -42,7 +42,7 @@ UPRIGHT = PlaneEvidence(np.array([0.0, 0, 1]), np.zeros(3), np.diag([1.0, 1.0, 0
 
 
 def align_sheets(
-    sheets: tuple[Sheet, ...], cloud: Cloud, options: AssembleOptions
+    sheets: tuple[Sheet, ...], cloud: Cloud, options: WholeOptions
 ) -> tuple[tuple[Sheet, ...], np.ndarray]:
     """Sheets with aligned normals and offsets, and (B,) their angular standard errors in radians.
 
@@ -85,13 +85,13 @@ def _evidence(sheet: Sheet, cloud: Cloud) -> PlaneEvidence:
     return PlaneEvidence(normal, centre, scatter, sigma, float(sigma / max(spread, 1e-6)), float(sum(weights)))
 
 
-def _tolerance(a: PlaneEvidence, b: PlaneEvidence, options: AssembleOptions) -> float:
+def _tolerance(a: PlaneEvidence, b: PlaneEvidence, options: WholeOptions) -> float:
     """How far two boards may be from parallel or square and still be meant so, radians."""
     own = options.direction_sigmas * np.hypot(a.angle_error, b.angle_error)
     return float(np.clip(own, np.radians(options.square_floor_degrees), np.radians(options.square_degrees)))
 
 
-def _direction_classes(evidence: list[PlaneEvidence], options: AssembleOptions) -> list[int]:
+def _direction_classes(evidence: list[PlaneEvidence], options: WholeOptions) -> list[int]:
     """Number of the direction class of each board; the surest boards found the classes."""
     order = sorted(range(len(evidence)), key=lambda k: evidence[k].angle_error)
     founders: list[int] = []
@@ -107,7 +107,7 @@ def _direction_classes(evidence: list[PlaneEvidence], options: AssembleOptions) 
     return classes
 
 
-def _fit_directions(evidence: list[PlaneEvidence], classes: list[int], options: AssembleOptions) -> np.ndarray:
+def _fit_directions(evidence: list[PlaneEvidence], classes: list[int], options: WholeOptions) -> np.ndarray:
     """(C, 3) unit directions: least squares over the boards of each class, square where the data allow it."""
     count = max(classes) + 1
     members = [[k for k, c in enumerate(classes) if c == number] for number in range(count)]

@@ -14,10 +14,10 @@ import shapely
 from scipy.spatial import cKDTree
 from shapely.geometry import LineString, Polygon
 
-from kerfwright.assemble.options import AssembleOptions
-from kerfwright.assemble.outlines import largest_piece
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.freespace import FreeSpace
+from kerfwright.identify.options import WholeOptions
+from kerfwright.identify.outlines import largest_piece
 from kerfwright.identify.types import Sheet
 
 __all__ = ["is_seen", "is_thin", "mended", "places_in", "usual_density"]
@@ -29,7 +29,7 @@ DENSE = 0.6  # of that density: a gap in such wood is real
 SAMPLES = 60
 
 
-def mended(sheets: tuple[Sheet, ...], cloud: Cloud, free: FreeSpace, options: AssembleOptions) -> tuple[Sheet, ...]:
+def mended(sheets: tuple[Sheet, ...], cloud: Cloud, free: FreeSpace, options: WholeOptions) -> tuple[Sheet, ...]:
     """The sheets with the gaps in their regions filled that are only gaps of the cloud."""
     reach, near = options.veil * cloud.diameter, options.end_offset * 2 * cloud.diameter
     dense = usual_density(sheets, cloud)

@@ -11,11 +11,11 @@ from clouds import pose, sheet
 from kerfwright.assemble import AssembleOptions
 from kerfwright.assemble.apart import kept_apart
 from kerfwright.assemble.flush import flush_neighbours
-from kerfwright.assemble.gaps import mended
-from kerfwright.assemble.outlines import constrained_region, filled_region, largest_piece
 from kerfwright.assemble.types import Assembly, ConstraintSegment
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.freespace import FreeSpace
+from kerfwright.identify.gaps import mended
+from kerfwright.identify.outlines import constrained_region, filled_region, largest_piece
 from kerfwright.model import Contact
 
 BLIND = FreeSpace((), (), 1.0, 1.0)

@@ -5,7 +5,7 @@ import pytest
 from shapely.geometry import box
 
 from clouds import pose, sheet, turned
-from kerfwright.assemble.joints import Search, columns, end_on, face_plane, runs_of, trace_of
+from kerfwright.identify.joints import Search, columns, end_on, face_plane, runs_of, trace_of
 
 REACH, SLACK, STEP = 15.0, 6.0, 2.0
 SEARCH = Search(reach=REACH, slack=SLACK, cover=SLACK, step=STEP, shortest=5.0)
