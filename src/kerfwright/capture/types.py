@@ -70,7 +70,10 @@ class View:
     def _as_on_disk(self) -> np.ndarray:
         import cv2
 
-        pixels = cv2.imread(str(self.path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+        try:
+            pixels = cv2.imread(str(self.path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+        except cv2.error:  # more pixels than OpenCV takes
+            pixels = None
         if pixels is None:
             raise CaptureError(f"{self.path}: image: cannot be read: check that the file is a whole JPEG, PNG or TIFF")
         return cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB)
