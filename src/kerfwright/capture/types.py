@@ -45,8 +45,9 @@ class View:
 
     def project(self, x_in_world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(N, 3) world to (N, 2) pixels, distortion included, and (N,) depth; pixels are NaN where depth <= 0."""
-        x_in_camera = self.to_camera(x_in_world)
-        return self.camera.project(x_in_camera), x_in_camera[:, 2]
+        from kerfwright.capture._lens import project_points
+
+        return project_points(np.asarray(x_in_world, float), self.camera_from_world, self.camera.lens)
 
     def image(self) -> np.ndarray:
         """The photograph, (height, width, 3) uint8 RGB, shrunk, but distorted as on disk. Read anew at each call.
