@@ -220,15 +220,19 @@ class Tally:
 
 
 def _work(parser: Parser, good: Path, folder: Path, tally: Tally, seed: int, last: int, log: Path) -> None:
-    """In a child: read until the last number, or until something ends the process."""
+    """In a child: read until the last number, or until something ends the process.
+
+    Libraries that keep memory do not use up what one input may have: another child goes on.
+    """
     faulthandler.disable()
     warnings.simplefilter("error")
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 1)
     os.dup2(null, 2)
     parser.read(folder / parser.files[0])  # loads libraries
-    resource.setrlimit(resource.RLIMIT_AS, (used_memory() + MEMORY, resource.RLIM_INFINITY))
-    while tally[0] < last:
+    before = used_memory()
+    resource.setrlimit(resource.RLIMIT_AS, (before + 2 * MEMORY, resource.RLIM_INFINITY))
+    while tally[0] < last and used_memory() < before + MEMORY:
         number = tally[0]
         what = read_one(parser, good, folder, seed, number)
         if what in ("read", "refused"):
