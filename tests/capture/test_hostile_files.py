@@ -222,3 +222,11 @@ def test_absolute_names_are_matched_by_their_ends_inside(capture_folder, name):
     opened = open_capture(capture_folder)
     assert len(opened.views) == 7 and name.rsplit("/")[-1].rsplit("\\")[-1] in opened.notes[0]
     assert all(capture_folder in view.path.parents for view in opened.views)
+
+
+def test_no_room_to_unpack_is_not_taken_for_damage(samples, monkeypatch):
+    from kerfwright.capture import laz
+
+    monkeypatch.setattr(laz, "UNPACK", "raise OSError(28, 'No space left on device', 'points')")
+    message = told(samples, "a.laz", (samples / "a.laz").read_bytes())
+    assert "No space left on device" in message and "free some space in /" in message and "damaged" not in message
