@@ -24,7 +24,7 @@ from scipy.spatial.transform import Rotation
 from shapely.geometry import LineString, Polygon
 from tables import markdown
 
-from kerfwright.assemble.splits import find_seam_lines
+from kerfwright.assemble.splits import SeamSearch, find_seam_lines
 from kerfwright.capture import Camera, Capture, Cloud
 from kerfwright.capture.frame import moved, similarity
 from kerfwright.identify.photo_edges import Photos
@@ -109,7 +109,7 @@ def judged(case: tuple[str, int, Path]) -> Result:
     diameter = capture.cloud.diameter
     obstacles = Obstacles([sheet, *touching], diameter / 100)
     start = time.perf_counter()
-    found = find_seam_lines(sheet, touching, Photos(capture), obstacles, diameter)
+    found = find_seam_lines(SeamSearch(sheet, touching, Photos(capture), obstacles, diameter))
     seconds = time.perf_counter() - start
     return compared(f"{name}_{seed}", true_seams(model), found, sheet, _scale(capture), seconds)
 
@@ -160,7 +160,8 @@ def scene(name: str, seed: int, out: Path) -> tuple[Model, Capture]:
 def _view(k: int, camera: Camera, pose: np.ndarray, jpeg: np.ndarray) -> MemoryView:
     import cv2
 
-    return MemoryView(f"{k}.jpg", Path(f"{k}.jpg"), camera, pose, cv2.imdecode(jpeg, cv2.IMREAD_COLOR)[..., ::-1])
+    pixels = cv2.imdecode(jpeg, cv2.IMREAD_COLOR)[..., ::-1]
+    return MemoryView(f"{k}.jpg", Path(f"{k}.jpg"), camera, pose, pixels=pixels)
 
 
 def _photographed(model: Model, options: CaptureOptions) -> list[tuple[Camera, np.ndarray, np.ndarray]]:

@@ -14,7 +14,7 @@ from scipy.ndimage import correlate1d, gaussian_filter1d, minimum_filter1d
 
 from kerfwright.assemble.texture import FaceStrips
 
-__all__ = ["Discontinuity", "discontinuity"]
+__all__ = ["Discontinuity", "discontinuity", "mean_of_views", "pressed_mean", "step_kernel"]
 
 LINE = 1.6  # samples, of the filter for lines: a joint is about one pixel wide
 STEPS = ((1, 4), (2, 10))  # samples left out beside the line, and averaged on each side
@@ -27,6 +27,7 @@ LEAST_SEEN = 0.25  # share of the face that must be seen at all
 LEAST_STRIPS = 0.5  # share of the strips that must show an offset
 TRIM = 1.5  # deviations from the median beyond which a strip counts no more
 LIKELY = 1.5  # standard errors
+CENTRED = 4  # samples to either side of a peak that say where its middle lies
 THIRDS = 3  # stretches of the line that must agree
 EIGHTHS = 8  # short stretches, of which none may lack the change altogether: slots and grooves end before the rim
 EIGHTH_SHARE = 0.5  # of the change that an eighth shows, less what chance takes
@@ -43,6 +44,13 @@ class Discontinuity:
     flat: np.ndarray  # (U, C, F) of every strip
     single: np.ndarray  # (V, U, C, F) of every view
 
+    sharp: bool = True  # lines, by whose distance a gap is known
+
+    @property
+    def shown(self) -> int:
+        """How many views there are."""
+        return len(self.single)
+
     def along(self, k: int) -> float:
         """Least share of the change at offset k that any third of the line shows."""
         return min(_share(part, self.line[k]) for part in np.array_split(self.flat[k], THIRDS))
@@ -52,6 +60,12 @@ class Discontinuity:
         chance = np.sqrt(EIGHTHS / (self.line.shape[1] * self.strength[k]))  # standard error of the share of an eighth
         least = EIGHTH_SHARE - LIKELY * chance
         return all(_share(part, self.line[k]) > least for part in np.array_split(self.flat[k], EIGHTHS))
+
+    def located(self, k: int) -> float:
+        """Offset of the middle of the peak at offset k, mm."""
+        near = slice(max(0, k - CENTRED), k + CENTRED + 1)
+        weight = np.maximum(np.nan_to_num(self.strength[near]) - 1, 1e-9)
+        return float(self.offsets[near] @ weight / weight.sum())
 
     def views(self, k: int) -> list[float]:
         """Share of the change at offset k that each view shows; views that do not show the offset are left out."""
@@ -65,7 +79,7 @@ def discontinuity(strips: FaceStrips) -> Discontinuity | None:
     colours = strips.colours[:, :, edge : len(strips.middles) - edge]
     if colours.shape[2] < EIGHTHS:
         return None
-    features = _filtered(_mean(colours))
+    features = _filtered(mean_of_views(colours))
     told = np.isfinite(features[..., 0])
     good = told.mean(axis=1) >= LEAST_STRIPS
     if told.mean() < LEAST_SEEN or good.sum() < 4 * REACH:
@@ -73,14 +87,14 @@ def discontinuity(strips: FaceStrips) -> Discontinuity | None:
     white = _whitening(features)
     flat = features @ white
     strength, line = np.full(len(flat), np.nan), np.full((len(flat), flat.shape[2]), np.nan)
-    line[good] = _trimmed(flat[good])
+    line[good] = pressed_mean(flat[good])
     usual = 1.4826 * np.median(np.abs(line[good]), axis=0)
     usual = np.hypot(usual, FAINTEST * np.linalg.norm(white, axis=0))
     strength[good] = gaussian_filter1d(((line[good] / usual) ** 2).mean(axis=1), BLUR)
     return Discontinuity(strips.offsets, strength, line, flat, np.array([_filtered(own) @ white for own in colours]))
 
 
-def _mean(colours: np.ndarray) -> np.ndarray:
+def mean_of_views(colours: np.ndarray) -> np.ndarray:
     """(U, C, 3) over the views that tell."""
     told = np.isfinite(colours[..., :1])
     count = told.sum(axis=0)
@@ -91,7 +105,7 @@ def _share(strips: np.ndarray, whole: np.ndarray) -> float:
     """How much of a change (F,) some strips (C, F) show; 1 is all of it, 0 is none or strips that show nothing."""
     if not np.isfinite(strips[:, 0]).any():
         return 0.0
-    return float(_trimmed(strips[None])[0] @ whole / (whole @ whole))
+    return float(pressed_mean(strips[None])[0] @ whole / (whole @ whole))
 
 
 def _filtered(strips: np.ndarray) -> np.ndarray:
@@ -99,13 +113,13 @@ def _filtered(strips: np.ndarray) -> np.ndarray:
     told = np.isfinite(strips[..., 0])
     filled = np.where(told[..., None], strips, 0.0)
     parts = [gaussian_filter1d(filled, LINE, axis=0, order=2, mode="nearest")]
-    parts += [correlate1d(filled, _step_kernel(*s), axis=0, mode="nearest") for s in STEPS]
+    parts += [correlate1d(filled, step_kernel(*s), axis=0, mode="nearest") for s in STEPS]
     out = np.concatenate(parts, axis=2)
     out[minimum_filter1d(told, 2 * REACH + 1, axis=0, mode="constant", cval=0) == 0] = np.nan
     return out
 
 
-def _step_kernel(gap: int, width: int) -> np.ndarray:
+def step_kernel(gap: int, width: int) -> np.ndarray:
     """Mean of what follows less mean of what precedes."""
     side = np.full(width, 1 / width)
     return np.concatenate([-side, np.zeros(2 * gap + 1), side])
@@ -123,12 +137,12 @@ def _whitening(features: np.ndarray) -> np.ndarray:
     return (vectors / np.sqrt(values)) / (scale * spread)[:, None]
 
 
-def _trimmed(flat: np.ndarray) -> np.ndarray:
+def pressed_mean(flat: np.ndarray) -> np.ndarray:
     """(U, F) means over the strips of (U, C, F), far ones pressed towards the median; every offset has some."""
     middle = _median(flat)[:, None]
     spread = TRIM * 1.4826 * _median(np.abs(flat - middle))[:, None]
     near = np.nan_to_num(np.clip(flat - middle, -spread, spread))
-    return middle[:, 0] + near.sum(axis=1) / np.isfinite(flat).sum(axis=1)
+    return middle[:, 0] + near.sum(axis=1) / np.maximum(np.isfinite(flat).sum(axis=1), 1)
 
 
 def _median(values: np.ndarray) -> np.ndarray:

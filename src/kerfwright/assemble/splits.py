@@ -15,7 +15,8 @@ import numpy as np
 from shapely.geometry import LineString, Polygon
 
 from kerfwright.assemble.discontinuity import Discontinuity, discontinuity
-from kerfwright.assemble.texture import face_strips
+from kerfwright.assemble.texture import FaceStrips, face_strips
+from kerfwright.assemble.tone import ToneSteps, runs_along_grain, tone_steps
 from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.types import Sheet
@@ -26,18 +27,22 @@ __all__ = ["SeamLine", "SeamSearch", "find_seam_lines", "seam_contact", "seam_se
 
 LEAST_STRENGTH = 7.0  # of a board's best seam, against the usual change across lines of its face
 LENT_STRENGTH = 4.0  # of further ones: where two boards were glued, more may have been
+LENT_TONE = 3.2  # ... told by tone: steps within made single boards had 2.9 at most
 LEAST_ALONG = 0.5  # share of the change that every third of the line must show
 LEAST_VIEWS = 4
 CERTAIN = 2.0  # times LEAST_STRENGTH; steep grain that passed for a seam in four views had up to 1.13
 DENIED = 2.0  # strength at a seam's place on the other face, below which there is none
 THROUGH = 1 / 150  # of D, between a seam's places on both faces
 LEAST_AGREEMENT = 0.75  # mean share of the change that a single view shows
-CENTRED = 4  # samples to either side of a peak that say where its middle lies
 EASED = 1 / 40  # of D; eased edges of two boards lie no further apart
 GAP_SHARE = 0.5  # of the way between two such lines: the rest is rounding; it cannot be told apart from above
 PARTNER = 0.7  # strength of the weaker line of the two
 NARROWEST = 1 / 16  # of D; narrower strips are shadows and edges more often than boards
+SEPARATE = 2 / 3  # of it, within which one joint is looked for
+TOGETHER = 1 / 100  # of D, within which a line and a step of tone are the same joint's
 KNOWN = 1 / 40  # of D, round lines in which other boards meet this one
+
+Change = Discontinuity | ToneSteps
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +73,14 @@ class SeamSearch:
 
         least : strength of a seam where one is expected; 0 asks for one that is clear by itself.
         """
-        faces = [_change(self.sheet, m, face, self.photos, self.obstacles, self.diameter) for face in ("top", "bottom")]
-        found = []
-        for own, other in (faces, faces[::-1]):
-            seams = [] if own is None else _seams_across(self.sheet, m, own, self.touching, self.diameter, least)
-            found.append([s for s in seams if not _is_denied(s, own, other, self.diameter)])
-        return max(found, key=_strongest)
+        strips = [_strips(self, m, face) for face in ("top", "bottom")]
+        lines = _on_either_face(self, m, [s and discontinuity(s) for s in strips], least or LENT_STRENGTH)
+        if least:
+            return lines
+        along = [s if s is not None and runs_along_grain(s) else None for s in strips]
+        tones = _on_either_face(self, m, [s and tone_steps(s) for s in along], LENT_TONE)
+        seams = _merged(lines, tones, self.diameter)
+        return seams if any(_is_clear(s) for s in seams) else []
 
 
 def _strongest(seams: list[SeamLine]) -> float:
@@ -88,21 +95,44 @@ def find_seam_lines(search: SeamSearch) -> list[SeamLine]:
     return sorted(max(found, key=_strongest), key=lambda s: s.offset)
 
 
-def _change(
-    sheet: Sheet, m: np.ndarray, face: str, photos: Photos, obstacles: Obstacles, diameter: float
-) -> Discontinuity | None:
-    """What changes across a face along m; None where too little of it is seen."""
-    ring = np.asarray(sheet.region.exterior.coords)[:, :2]
-    margin = NARROWEST * diameter
+def _strips(search: SeamSearch, m: np.ndarray, face: str) -> FaceStrips | None:
+    """What the photographs show of a face across m; None where too little of it is seen."""
+    ring = np.asarray(search.sheet.region.exterior.coords)[:, :2]
+    margin = NARROWEST * search.diameter
     if np.ptp(ring @ m) < 2.5 * margin or np.ptp(ring @ [-m[1], m[0]]) < margin:
         return None
-    strips = face_strips(sheet, m, face, photos, obstacles, diameter)
-    return discontinuity(strips) if strips is not None and len(strips.colours) >= LEAST_VIEWS else None
+    strips = face_strips(search.sheet, m, face, search.photos, search.obstacles, search.diameter)
+    return strips if strips is not None and len(strips.colours) >= LEAST_VIEWS else None
 
 
-def _is_denied(seam: SeamLine, own: Discontinuity, other: Discontinuity | None, diameter: float) -> bool:
+def _on_either_face(
+    search: SeamSearch, m: np.ndarray, faces: list[Change | None], least: float
+) -> list[SeamLine]:
+    """Seams of the face that shows the strongest one, all that the other face does not deny."""
+    found = []
+    for own, other in (faces, faces[::-1]):
+        seams = [] if own is None else _seams_across(search.sheet, m, own, search.touching, search.diameter, least)
+        found.append([s for s in seams if not _is_denied(s, own, other, search.diameter)])
+    return max(found, key=_strongest)
+
+
+def _merged(lines: list[SeamLine], tones: list[SeamLine], diameter: float) -> list[SeamLine]:
+    """One seam a joint. A joint that shows as a line is known best by it, and is as clear as its tone makes it."""
+    out, tones = [], list(tones)
+    for seam in sorted(lines, key=lambda s: -s.strength):
+        same = [t for t in tones if abs(t.offset - seam.offset) < TOGETHER * diameter]
+        rivals = [t for t in tones if abs(t.offset - seam.offset) < SEPARATE * NARROWEST * diameter and t not in same]
+        if any(t.strength > seam.strength for t in rivals):
+            continue
+        best = max([seam, *same], key=lambda s: s.strength)
+        out.append(replace(seam, strength=best.strength, views=best.views))
+        tones = [t for t in tones if t not in same and t not in rivals]
+    return out + tones
+
+
+def _is_denied(seam: SeamLine, own: Change, other: Change | None, diameter: float) -> bool:
     """Whether the other face, shown by as many views, changes no more than usual there: a seam goes right through."""
-    if other is None or len(other.single) < len(own.single):
+    if other is None or other.shown < own.shown:
         return False
     near = np.abs(other.offsets - seam.offset) < THROUGH * diameter
     told = other.strength[near & np.isfinite(other.strength)]
@@ -110,20 +140,19 @@ def _is_denied(seam: SeamLine, own: Discontinuity, other: Discontinuity | None, 
 
 
 def _seams_across(
-    sheet: Sheet, m: np.ndarray, change: Discontinuity, touching: list[Sheet], diameter: float, least: float
+    sheet: Sheet, m: np.ndarray, change: Change, touching: list[Sheet], diameter: float, least: float
 ) -> list[SeamLine]:
-    """Seams of one face: those stronger than `least`, or, where that is 0, all if one of them is clear."""
+    """Seams of one face that are stronger than `least`."""
     ring = np.asarray(sheet.region.exterior.coords)[:, :2]
     margin = NARROWEST * diameter
     known = _known_lines(sheet, m, touching)
-    places = _seam_places(change, ring @ m, margin, least or LENT_STRENGTH)
+    places = _seam_places(change, ring @ m, margin, least)
     seams = [_seam(change, k, m, ring, diameter) for k in places]
-    seams = [
+    return [
         s for s in seams
         if all(abs(s.offset - other) > KNOWN * diameter for other in known)
         and _crosses_all(sheet.region, m, s.offset, margin / 4)
     ]
-    return seams if least or any(_is_clear(s) for s in seams) else []
 
 
 def _is_clear(seam: SeamLine) -> bool:
@@ -131,11 +160,11 @@ def _is_clear(seam: SeamLine) -> bool:
     return seam.strength > LEAST_STRENGTH and (seam.views > LEAST_VIEWS or seam.strength > CERTAIN * LEAST_STRENGTH)
 
 
-def _seam_places(change: Discontinuity, across: np.ndarray, margin: float, least: float) -> list[int]:
+def _seam_places(change: Change, across: np.ndarray, margin: float, least: float) -> list[int]:
     """Offsets whose change is strong, runs along the whole line, shows in the views, and is the strongest near by."""
     strength = np.nan_to_num(change.strength)
     inner = (change.offsets > across.min() + margin) & (change.offsets < across.max() - margin)
-    reach = round(margin / (change.offsets[1] - change.offsets[0]) * 2 / 3)
+    reach = round(margin / (change.offsets[1] - change.offsets[0]) * SEPARATE)
     peaks = [
         int(k) for k in np.flatnonzero(inner & (strength > least))
         if strength[k] == strength[max(0, k - reach) : k + reach + 1].max()
@@ -152,14 +181,12 @@ def _showing(shares: list[float]) -> int:
     return sum(share > LEAST_ALONG for share in shares)
 
 
-def _seam(change: Discontinuity, k: int, m: np.ndarray, ring: np.ndarray, diameter: float) -> SeamLine:
+def _seam(change: Change, k: int, m: np.ndarray, ring: np.ndarray, diameter: float) -> SeamLine:
     """The seam at a peak: its middle, ends on the outline's box, and the gap where eased edges show as two lines."""
     along, strength = ring @ np.array([-m[1], m[0]]), np.nan_to_num(change.strength)
     step = float(change.offsets[1] - change.offsets[0])
-    apart = step * _partner(strength, k, EASED * diameter / step)
-    near = slice(max(0, k - CENTRED), k + CENTRED + 1)
-    weight = np.maximum(strength[near] - 1, 1e-9)
-    at = float(change.offsets[near] @ weight / weight.sum()) + apart / 2
+    apart = step * _partner(strength, k, EASED * diameter / step) if change.sharp else 0.0
+    at = change.located(k) + apart / 2
     start, end = at * m + np.array([[along.min()], [along.max()]]) * np.array([-m[1], m[0]])
     views = _showing(change.views(k))
     return SeamLine(m, at, start, end, float(strength[k]), views, abs(apart) * GAP_SHARE)

@@ -1,0 +1,182 @@
+"""Where the tone of a face steps along a straight line: boards of one tree differ in hue by a grey level or less.
+
+No pixel shows that. Means over the whole line and over broad windows beside it do, for a board hardly varies in hue
+within itself. What a step is measured against is twofold: how much such means differ elsewhere on this face, and how
+much they differ from stretch to stretch of this line. A joint is the same all along; grain, shadows and the border of
+the heartwood wander.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import correlate1d, minimum_filter1d
+
+from kerfwright.assemble.discontinuity import (
+    EDGE,
+    EIGHTHS,
+    FAINTEST,
+    LEAST_SEEN,
+    LEAST_STRIPS,
+    THIRDS,
+    mean_of_views,
+    pressed_mean,
+    step_kernel,
+)
+from kerfwright.assemble.texture import STRIP, FaceStrips
+
+__all__ = ["ToneSteps", "runs_along_grain", "tone_steps"]
+
+# Samples left out beside the line (JPEG smears hue), and averaged on each side; the narrowest tells only how sudden a
+# step is, and where it lies.
+WINDOWS = ((3, 8), (4, 16), (4, 30))
+SUDDEN = ((0.55, 1.6), (0.75, 1.6))  # of the broadest window's step that the others show; an even slope has 0.38 and
+# 0.64, a dark line more than all
+BEYOND = (30, 26)  # samples: the narrowest board is hardly wider than both, and has one tone so far
+LASTS = (0.45, 1.7)  # of the step, that must be there still; less is a band of late wood, an even slope has 2.2
+NEAR = 8  # samples from the strongest place to the best one, and from there to what counts for its middle
+MIDDLE = 0.6  # of the best place's, which others must have to count for its middle
+STRETCHES = 16  # of the line, whose steps are compared
+INDEPENDENT = 4.0  # of them: grain runs on from one into the next
+CLIP = 2.5  # robust deviations of stretches: a knot does not set the measure
+USUAL = 0.7  # share of the offsets that set the measure; at others may be seams or shadows
+ROUNDS = 8
+CHI2_MEDIAN = 2.366  # of three degrees of freedom
+SCALE = 7 / 29  # to the strengths of `discontinuity`; 30 made single boards (seeds from 1000) had 2.9 at most
+LEAST_EIGHTHS = 7  # that must step to the same side
+
+
+@dataclass(frozen=True, eq=False)
+class ToneSteps:
+    """How much the tone of a face steps at every offset, against what it does elsewhere; NaN is unseen."""
+
+    offsets: np.ndarray  # (U,) mm along m
+    strength: np.ndarray  # (U,)
+    line: np.ndarray  # (U, 3) the step of log brightness itself, of the broadest window
+    weight: np.ndarray  # (U, 3) by which colours count for it
+    flats: list[np.ndarray]  # (U, C, 3) of every window and strip
+    profile: np.ndarray  # (U, 3) log brightness along m, of all views and strips
+    colours: np.ndarray  # (V, U, C, 3) of every view
+
+    sharp: bool = False
+
+    @property
+    def shown(self) -> int:
+        """How many views there are."""
+        return len(self.colours)
+
+    def along(self, k: int) -> float:
+        """Least share of the step at offset k that any third of the line shows."""
+        return min(self._share(part, k) for part in np.array_split(self.flats[-1][k], THIRDS))
+
+    def unbroken(self, k: int) -> bool:
+        """Whether all eighths of the line but one step to the same side at offset k, suddenly, as shadows do not, and
+        for good, as bands of late wood do not.
+        """
+        same = sum(self._share(part, k) > 0 for part in np.array_split(self.flats[-1][k], EIGHTHS))
+        shares = [self._share(flat[k], k) for flat in self.flats[:-1]]
+        sudden = all(low < share < high for share, (low, high) in zip(shares, SUDDEN, strict=True))
+        return same >= LEAST_EIGHTHS and sudden and LASTS[0] < self.beyond(k) < LASTS[1]
+
+    def beyond(self, k: int) -> float:
+        """Share of the step at offset k that wood further away shows; 1 where none is seen there."""
+        gap, width = BEYOND
+        after = self.profile[k + gap + 1 : k + gap + width + 1]
+        before = self.profile[max(0, k - gap - width) : max(0, k - gap)]
+        if not min(np.isfinite(side[:, 0]).sum() for side in (after, before)):
+            return 1.0
+        step = np.nanmean(after, axis=0) - np.nanmean(before, axis=0)
+        return float(step @ self.weight[k] / (self.line[k] @ self.weight[k]))
+
+    def located(self, k: int) -> float:
+        """Offset of the place near offset k that parts the two tones best, mm."""
+        steps = [np.nan_to_num(pressed_mean(flat)) @ self.weight[k] for flat in self.flats]
+        side = np.sign(steps[-1][k])
+        fit = sum((np.maximum(side * step, 0) / _deviation(step)) ** 2 for step in steps)
+        low = max(0, k - NEAR)
+        best = low + int(np.argmax(fit[low : k + NEAR + 1]))
+        near = slice(max(0, best - NEAR), best + NEAR + 1)
+        counts = np.maximum(fit[near] - MIDDLE * fit[best], 0)
+        return float(self.offsets[near] @ counts / counts.sum())
+
+    def views(self, k: int) -> list[float]:
+        """Share of the step at offset k that each view shows; views that do not show the offset are left out."""
+        gap, width = WINDOWS[-1]
+        near = self.colours[:, max(0, k - gap - width) : k + gap + width + 1]
+        steps = [_stepped(own, WINDOWS[-1])[min(k, gap + width)] for own in near]
+        return [self._share(own, k) for own in steps if np.isfinite(own[:, 0]).mean() >= LEAST_STRIPS]
+
+    def _share(self, strips: np.ndarray, k: int) -> float:
+        """How much of the step at k some strips (C, 3) show; 1 is all of it, 0 is none or strips that show nothing."""
+        if not np.isfinite(strips[:, 0]).any():
+            return 0.0
+        return float(pressed_mean(strips[None])[0] @ self.weight[k] / (self.line[k] @ self.weight[k]))
+
+
+def tone_steps(strips: FaceStrips) -> ToneSteps | None:
+    """The steps of tone across lines square to m; None when hardly anything was seen."""
+    edge = round(EDGE * len(strips.middles))
+    colours = strips.colours[:, :, edge : len(strips.middles) - edge]
+    if colours.shape[2] < STRETCHES:
+        return None
+    mean = mean_of_views(colours)
+    flats = [_stepped(mean, window) for window in WINDOWS]
+    good = np.isfinite(flats[-1][..., 0]).mean(axis=1) >= LEAST_STRIPS
+    if np.isfinite(mean[..., 0]).mean() < LEAST_SEEN or good.sum() < 2 * WINDOWS[-1][1]:
+        return None
+    strength, line, weight = (np.full((len(good), *shape), np.nan) for shape in ((), (3,), (3,)))
+    total = 0.0
+    for flat in flats[1:]:
+        step, counts = _weighed(flat[good])
+        total = total + np.einsum("ui,ui->u", step, counts)
+    strength[good], line[good], weight[good] = SCALE * total, step, counts
+    return ToneSteps(strips.offsets, strength, line, weight, flats, pressed_mean(mean), colours)
+
+
+def runs_along_grain(strips: FaceStrips) -> bool:
+    """Whether colours vary more across the lines than along them. Only then does tone tell: across the grain, a board's
+    rings end, light falls off over a greater length, and soft shadows of upright things lie in line with a joint.
+    """
+    mean = mean_of_views(strips.colours)
+    apart = STRIP // 2
+    across = np.nanmedian(np.abs(mean[apart:] - mean[:-apart]))
+    return bool(across > np.nanmedian(np.abs(mean[:, 1:] - mean[:, :-1])))
+
+
+def _deviation(values: np.ndarray) -> float:
+    """Robust standard deviation."""
+    return float(1.4826 * np.median(np.abs(values))) + 1e-12
+
+
+def _stepped(strips: np.ndarray, window: tuple[int, int]) -> np.ndarray:
+    """(U, C, 3) mean of what follows less mean of what precedes; NaN near what is unseen."""
+    told = np.isfinite(strips[..., 0])
+    out = correlate1d(np.where(told[..., None], strips, 0.0), step_kernel(*window), axis=0, mode="nearest")
+    out[minimum_filter1d(told, 2 * sum(window) + 1, axis=0, mode="constant", cval=0) == 0] = np.nan
+    return out
+
+
+def _weighed(flat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Steps (U, 3) of the whole line out of its strips' (U, C, 3), and (U, 3) by what each colour's counts: their
+    product is Mahalanobis' distance, squared.
+    """
+    step = pressed_mean(flat)
+    parts = np.array_split(flat, STRETCHES, axis=1)
+    stretches = np.stack([pressed_mean(part) for part in parts], axis=1)
+    away = np.nan_to_num(stretches - step[:, None])
+    spread = CLIP * 1.4826 * np.median(np.abs(away), axis=1, keepdims=True)
+    away = np.clip(away, -spread, spread)
+    between = np.einsum("usi,usj->uij", away, away) / STRETCHES / INDEPENDENT
+    spread = _usual(step) + between + FAINTEST**2 * np.eye(3)
+    return step, np.linalg.solve(spread, step[..., None])[..., 0]
+
+
+def _usual(step: np.ndarray) -> np.ndarray:
+    """(3, 3) covariance of the steps (U, 3) at most offsets: those that step least."""
+    kept, tiny = np.ones(len(step), bool), 1e-12 * np.eye(3)
+    for _ in range(ROUNDS):
+        covariance = step[kept].T @ step[kept] / kept.sum() + tiny
+        far = np.einsum("ui,ui->u", step, np.linalg.solve(covariance, step.T).T)
+        kept = far <= np.quantile(far, USUAL)
+    return covariance * np.median(far) / CHI2_MEDIAN
