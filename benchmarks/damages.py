@@ -132,7 +132,6 @@ def damaged_laz(data: bytes, chance: random.Random) -> bytes:
 # ASTM E2807: 48 bytes of header, among them the length of the file, where its XML begins and how long it is; then
 # binary sections, then XML, all in pages of 1020 bytes and a check sum of four.
 _HEAD = "<8sIIQQQQ"
-_PAGE, _CONTENT = 1024, 1020
 _E57_TYPES = (b"Integer", b"ScaledInteger", b"Float", b"String", b"Blob", b"Structure", b"Vector", b"CompressedVector")
 _ELEMENT = re.compile(rb"<(\w+)[^<>]*(?:/>|>[^<]*</\1>|>(?:(?!<\1[ >]).)*?</\1>)", re.DOTALL)
 _E57_ATTRIBUTES = (
@@ -148,9 +147,11 @@ def damaged_e57(data: bytes, chance: random.Random) -> bytes:
     """
     if chance.random() < 0.125:
         return damaged(data, chance)
-    content = b"".join(data[k : k + _CONTENT] for k in range(0, len(data), _PAGE))
+    from e57 import CONTENT, PAGE, content_of, paged
+
+    content = content_of(data)
     head = list(struct.unpack_from(_HEAD, content))
-    begin = head[4] - head[4] // _PAGE * (_PAGE - _CONTENT)
+    begin = head[4] - head[4] // PAGE * (PAGE - CONTENT)
     binary, xml = content[48:begin], content[begin : begin + head[5]]
     for _ in range(chance.randint(1, 3)):
         where = chance.random()
@@ -161,14 +162,8 @@ def damaged_e57(data: bytes, chance: random.Random) -> bytes:
         else:
             head[chance.randrange(1, 7)] = chance.choice(WHOLE) & 0xFFFFFFFF
     if chance.random() < 0.95:
-        head[3], head[5] = -(-(begin + len(xml)) // _CONTENT) * _PAGE, len(xml)
+        head[3], head[5] = -(-(begin + len(xml)) // CONTENT) * PAGE, len(xml)
     return paged(struct.pack(_HEAD, *head) + binary + xml)
-
-
-def paged(content: bytes) -> bytes:
-    """Pages of an E57 file: each ends with the CRC-32C of what it holds (ASTM E2807, 8.2)."""
-    pages = (content[k : k + _CONTENT].ljust(_CONTENT, b" ") for k in range(0, len(content), _CONTENT))
-    return b"".join(page + _crc32c(page).to_bytes(4, "big") for page in pages)
 
 
 def _other_element(xml: bytes, chance: random.Random) -> bytes:
@@ -220,19 +215,3 @@ def _put(data: bytes, found: list[re.Match[bytes]], other: bytes, chance: random
 
 _XML_DAMAGES = (_other_element, _other_element, _other_type, _other_value, _other_value, _other_value, _other_attribute,
                 _other_name, _flip, _cut, _snippet)  # fmt: skip
-
-
-def _crc32c(data: bytes) -> int:
-    value = 0xFFFFFFFF
-    for byte in data:
-        value = _CRC[(value ^ byte) & 255] ^ value >> 8
-    return value ^ 0xFFFFFFFF
-
-
-def _crc_row(value: int) -> int:
-    for _ in range(8):
-        value = value >> 1 ^ (0x82F63B78 if value & 1 else 0)
-    return value
-
-
-_CRC = tuple(map(_crc_row, range(256)))

@@ -17,9 +17,9 @@ import traceback
 from collections.abc import Sequence
 from pathlib import Path
 
-__all__ = ["LONGEST", "ForkServer"]
+__all__ = ["ForkServer"]
 
-LONGEST = 15  # seconds for one input: a hang
+LONGEST, LONGEST_WAIT = 15, 600  # seconds of processor, and on the clock, for one input: a hang
 
 
 class ForkServer:
@@ -41,7 +41,7 @@ class ForkServer:
         self._server.stdin.write(json.dumps(task).encode() + b"\n")
         self._server.stdin.flush()
         answer = json.loads(self._server.stdout.readline())
-        if answer["code"] == -signal.SIGALRM:
+        if answer["code"] in (-signal.SIGALRM, -signal.SIGXCPU, -signal.SIGKILL):
             raise TimeoutError("lazrs did not end")
         return answer["code"], base64.b64decode(answer["said"])
 
@@ -68,7 +68,8 @@ def serve(program: str) -> None:
 
 def _in_child(code, arguments: Sequence[str], used: int, given: int, said: int) -> int:
     """Run the program as if it had been started with these arguments; its limit counts from what is used by now."""
-    signal.alarm(LONGEST)
+    signal.alarm(LONGEST_WAIT)
+    resource.setrlimit(resource.RLIMIT_CPU, (LONGEST, LONGEST))
     os.dup2(said, 2)
     *others, memory = arguments
     sys.argv, sys.stdin = ["-c", *others, str(int(memory) + used)], open(given)  # noqa: SIM115

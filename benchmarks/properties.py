@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 from runs import reconstruct
+from scipy.spatial import cKDTree
 from tables import markdown
 
 from kerfwright.capture import Capture, Cloud, View, open_capture, write_colmap_text, write_ply
@@ -85,14 +86,14 @@ def write_variant(capture: Capture, variant: Variant, folder: Path) -> float:
 
 
 def _write_image(view: View, path: Path, mirrored: bool) -> None:
-    """The same bytes, or the picture mirrored without further loss."""
+    """The same bytes, or the picture mirrored without loss: PNG, whatever its name, for readers look at the bytes."""
     path.parent.mkdir(parents=True, exist_ok=True)
     if not mirrored:
         shutil.copy(view.path, path)
         return
     import cv2
 
-    cv2.imwrite(str(path), view.image()[:, ::-1, ::-1], [cv2.IMWRITE_JPEG_QUALITY, 100])
+    path.write_bytes(cv2.imencode(".png", view.image()[:, ::-1, ::-1])[1].tobytes())
 
 
 def _moved(view: View, variant_from_capture: np.ndarray, mirrored: bool) -> View:
@@ -170,11 +171,28 @@ def compare_prepared(found: Capture, base: Capture, variant: Variant) -> list[st
     """A row of the table of what the stages get; working units, D = 500."""
     if len(found.cloud) != len(base.cloud):
         return [variant.name, str(len(found.cloud)), "-", "-", "-"]
+    if np.linalg.det(variant.variant_from_capture) < 0:
+        found = _mirrored_back(found, base)
     pairs = [(found.cloud.points, base.cloud.points)]
     pairs += [(a.camera_from_world, b.camera_from_world) for a, b in zip(found.views, base.views, strict=True)]
     differ = [np.count_nonzero(a != b) for a, b in pairs]
     largest = max(np.abs(a - b).max() for a, b in pairs)
     return [variant.name, str(len(found.cloud)), str(differ[0]), str(sum(differ[1:])), f"{largest:.1e}"]
+
+
+def _mirrored_back(found: Capture, base: Capture) -> Capture:
+    """The capture mirrored along the axis, x or y, that brings its points to those of the base; in the base's order."""
+    choices = []
+    for axis in (0, 1):
+        flip = np.eye(4)
+        flip[axis, axis] = -1
+        points = transform_points(flip, found.cloud.points)
+        distance, nearest = cKDTree(points).query(base.cloud.points)
+        choices.append((float(distance.max()), flip, points[nearest]))
+    _, flip, points = min(choices, key=lambda choice: choice[0])
+    image = np.diag([-1.0, 1.0, 1.0, 1.0])
+    views = tuple(replace(view, camera_from_world=image @ view.camera_from_world @ flip) for view in found.views)
+    return replace(found, cloud=Cloud(points, points), views=views)
 
 
 def run(capture: Path, out: Path, scale: float, up: str) -> Path:
@@ -191,11 +209,13 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--prepared", action="store_true", help="only what the stages get: equal numbers, equal models")
+    parser.add_argument("--only", action="append", help="name of a variant; may be repeated")
     given = parser.parse_args()
     shutil.rmtree(given.out / "properties", ignore_errors=True)
     capture, work, rows = open_capture(given.capture), given.out / "properties", []
     base = None
-    for k, variant in enumerate([Variant("untouched", np.eye(4)), *variants(given.seed)]):
+    chosen = [variant for variant in variants(given.seed) if not given.only or variant.name in given.only]
+    for k, variant in enumerate([Variant("untouched", np.eye(4)), *chosen]):
         folder = work / str(k) / "capture"  # one name for all, as it stands in the model
         scaled = write_variant(capture, variant, folder)
         scale = capture.scale.millimetres_per_unit / scaled

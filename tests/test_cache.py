@@ -58,6 +58,36 @@ def test_another_basis_runs_all_and_drops_the_old(tmp_path):
     assert len(old) == 2 and not old & set(tmp_path.iterdir())
 
 
+def test_a_stage_whose_inputs_come_out_as_before_is_not_run_again(tmp_path):
+    """The capture's folder changed, but what was read from it did not."""
+    stages = {"a": Counter(1), "b": Counter(2)}
+
+    def run_with(path: str) -> list[int]:
+        cache = StageCache(tmp_path, str, lambda: path)
+        cache.get("a", ("path",), stages["a"])
+        cache.get("b", ("a",), stages["b"])
+        return [s.runs for s in stages.values()]
+
+    assert run_with("one") == [1, 1]
+    assert run_with("two") == [2, 1]
+    stages["a"].result = 5
+    assert run_with("three") == [3, 2]
+
+
+def test_what_a_result_depends_on_besides_is_in_its_key(tmp_path):
+    stage, cache = Counter(1), StageCache(tmp_path)
+    assert [cache.get("a", (), stage, lambda said=said: said)[1] for said in "xxyy"] == [False, True, False, True]
+
+
+def test_a_folder_where_a_result_should_be_is_told(tmp_path):
+    StageCache(tmp_path).get("a", (), Counter(1))
+    (entry,) = tmp_path.iterdir()
+    entry.unlink()
+    entry.mkdir()
+    with pytest.raises(OutputError, match="Is a directory: delete"):
+        StageCache(tmp_path).get("a", (), Counter(1))
+
+
 def test_a_stage_cut_short_is_run_again(tmp_path):
     stages = {"a": Counter(list(range(100))), "b": Counter(2)}
     run(tmp_path, stages)
@@ -150,7 +180,8 @@ def test_folder_hash_sees_content_names_and_nothing_else(tmp_path):
 
 def test_the_program_s_hash_is_the_same_in_every_process():
     script = "from kerfwright.cache import program_hash; print(program_hash())"
-    other = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env={"PYTHONHASHSEED": "7"})
+    seeded = os.environ | {"PYTHONHASHSEED": "7"}
+    other = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=seeded)
     assert other.stdout.strip() == program_hash()
 
 

@@ -1,16 +1,19 @@
 """The pipeline's own work: order, what it merges, what it keeps of the times."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from kerfwright import __version__, pipeline
-from kerfwright.capture.types import Capture, Cloud
-from kerfwright.errors import OptionError, StageError
+from kerfwright.capture.camera import Camera
+from kerfwright.capture.types import Capture, Cloud, View
+from kerfwright.errors import CaptureError, OptionError, StageError
 from kerfwright.identify.types import Parts
 from kerfwright.model import Finding, Scale
+from kerfwright.output import OutputFolder
 from kerfwright.pipeline import ReconstructOptions, Stage, run_stages
 from kerfwright.progress import Reporter
 from kerfwright.refine import RefineOptions
@@ -67,6 +70,72 @@ def test_every_stage_needs_only_what_came_before():
     for stage in pipeline.STAGES:
         assert set(stage.needs) <= known, stage.name
         known.add(stage.name)
+
+
+class Counted:
+    """The pipeline's stages with results of no cost: the capture is read from files of a folder, the others are names.
+
+    `again(options)` runs them and says which were not kept.
+    """
+
+    def __init__(self, folder):
+        self.folder, self.log = folder / "capture", []
+        self.stages = [replace(stage, run=partial(self.work, stage.name)) for stage in pipeline.STAGES]
+        self.out = OutputFolder(folder / "out")
+        self.folder.mkdir()
+        self.put("cameras.txt", "a.jpg")
+        self.put("a.jpg", "a")
+
+    def put(self, name, text):
+        (self.folder / name).write_text(text)
+
+    def work(self, name, *arguments):
+        self.log.append(name)
+        options = arguments[-1]
+        if name != "capture":
+            return name
+        camera = Camera("PINHOLE", 4, 3, (5.0, 5.0, 2.0, 1.5))
+        names = (self.folder / "cameras.txt").read_text().split()
+        views = tuple(View(name, self.folder / name, camera, np.eye(4)) for name in names)
+        return replace(capture(), views=views, scale=Scale(millimetres_per_unit=options.millimetres_per_unit or 1000))
+
+    def again(self, **options):
+        self.log.clear()
+        cache = pipeline.stage_cache(self.folder, self.out)
+        run_stages(self.folder, ReconstructOptions(**options), Reporter(), cache, self.stages)
+        return " ".join(self.log)
+
+
+def test_a_stage_is_run_again_only_when_what_it_is_told_or_shown_has_changed(tmp_path):
+    counted = Counted(tmp_path)
+    assert counted.again() == "capture identify assemble refine check"
+    assert counted.again() == ""
+    assert counted.again(millimetres_per_unit=25.0) == "capture check"
+    assert counted.again(length="top:x=420mm") == "capture check", "the capture without a scale was dropped"
+    assert counted.again(stock="18", millimetres_per_unit=25.0) == "capture refine check"
+    assert counted.again(stock="18", millimetres_per_unit=26.0) == "capture refine check"
+    assert counted.again() == "capture refine check"
+    assert counted.again(seed=1) == "identify refine check"
+    assert counted.again(seed=1, without="seams") == "refine check"
+
+
+def test_photographs_touch_only_what_is_shown_them(tmp_path):
+    counted = Counted(tmp_path)
+    counted.again()
+    counted.put("b.jpg", "b")
+    assert counted.again() == "capture", "no camera names it"
+    counted.put("cameras.txt", "a.jpg b.jpg")
+    assert counted.again() == "capture identify assemble refine check"
+    counted.put("b.jpg", "B")
+    assert counted.again() == "capture identify assemble refine", "the model comes from what these found: the same"
+
+
+def test_a_photograph_that_goes_while_stages_run_is_told(tmp_path):
+    counted = Counted(tmp_path)
+    counted.again()
+    (counted.folder / "a.jpg").unlink()
+    with pytest.raises(CaptureError, match=r"a\.jpg: image: No such file"):
+        counted.again()
 
 
 def test_findings_are_merged_in_the_order_of_the_stages():

@@ -1,7 +1,8 @@
 """Results of stages, kept so that a run that was ended goes on where it was.
 
-The key of a result is a hash of everything that it can depend on: the bytes of the capture's files, the options,
-kerfwright's own source, the versions of the libraries, and the keys of the stages that it needs. Nothing is ever looked
+The key of a result is a hash of everything that it can depend on: kerfwright's own source, the versions of the
+libraries, the options that its stage is told, and the bytes of what it needs: the capture's files, or other stages'
+results. So a stage whose inputs come out as before is not run again, though what made them was. Nothing is ever looked
 up by name or time alone.
 """
 
@@ -13,6 +14,7 @@ import os
 import pickle
 import sys
 from collections.abc import Callable, Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -37,56 +39,61 @@ class StageCache:
     ----------
     folder : made when the first result is kept; None keeps nothing.
     basis : called once, when the first key is needed: a hash of what all results depend on.
+    path : called once, when a stage needs it: a hash of the capture's files.
     """
 
-    def __init__(self, folder: Path | None, basis: Callable[[], str] = str) -> None:
+    def __init__(self, folder: Path | None, basis: Callable[[], str] = str, path: Callable[[], str] = str) -> None:
         self._folder = folder
-        self._basis = basis
-        self._keys: dict[str, str] = {}
+        self._basis = cache(basis)
+        self._path = cache(path)
+        self._files: dict[str, Path] = {}
+        self._digests: dict[str, str] = {}
 
-    def get(self, name: str, needs: Iterable[str], make: Callable[[], Any]) -> tuple[Any, bool]:
+    def get(
+        self, name: str, needs: Iterable[str], make: Callable[[], Any], other: Callable[[], str] = str
+    ) -> tuple[Any, bool]:
         """The result of stage `name`, and whether it was there already; made and kept otherwise.
 
+        `needs` names results that were got before, or "path"; `other` tells what it depends on besides.
         Raises OutputError when the disk is full.
         """
         if self._folder is None:
             return make(), False
-        path = self._path(name, needs)
+        parts = [name, self._basis(), other(), *map(self._digest, needs)]
+        key = hashlib.sha256("\n".join(parts).encode()).hexdigest()
+        path = self._files[name] = self._folder / f"{name}-{key[:32]}"
         kept = _read(path)
-        if kept is not None:
-            return kept[0], True
-        result = make()
-        self._keep(path, result)
-        return result, False
+        if kept is None:
+            result = make()
+            self._digests[name] = self._keep(path, result)
+            return result, False
+        self._digests[name] = kept[1]
+        return kept[0], True
+
+    def _digest(self, need: str) -> str:
+        return self._path() if need == "path" else self._digests[need]
 
     def prune(self) -> None:
         """Drop what this run did not use."""
         if self._folder is not None and self._folder.is_dir():
-            used = {self._file(name) for name in self._keys}
+            used = set(self._files.values())
             for path in sorted(self._folder.iterdir()):
                 if path not in used:
                     path.unlink()
 
-    def _path(self, name: str, needs: Iterable[str]) -> Path:
-        if not self._keys:
-            self._keys["path"] = self._basis()
-        parts = [name, *(self._keys[need] for need in needs)]
-        self._keys[name] = hashlib.sha256("\n".join(parts).encode()).hexdigest()
-        return self._file(name)
-
-    def _file(self, name: str) -> Path:
-        return self._folder / f"{name}-{self._keys[name][:32]}"
-
-    def _keep(self, path: Path, result: Any) -> None:
+    def _keep(self, path: Path, result: Any) -> str:
+        """Write the result; the hash of its bytes."""
         data = pickle.dumps(result, protocol=5)
+        digest = hashlib.sha256(data)
         beside = path.with_name(f"{path.name}.partial")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            beside.write_bytes(hashlib.sha256(data).digest() + data)
+            beside.write_bytes(digest.digest() + data)
             os.replace(beside, path)
         except OSError as error:
             beside.unlink(missing_ok=True)
             raise OutputError(f"{path}: cache: {error.strerror}: free some space or choose another folder") from error
+        return digest.hexdigest()
 
 
 NO_CACHE = StageCache(None)
@@ -99,17 +106,19 @@ def read_kept(folder: Path, name: str) -> Any:
     return None if kept is None else kept[0]
 
 
-def _read(path: Path) -> tuple[Any] | None:
-    """The result in a file; None when it is not there or not whole."""
+def _read(path: Path) -> tuple[Any, str] | None:
+    """The result in a file, and the hash of its bytes; None when it is not there or not whole."""
     try:
         data = path.read_bytes()
     except FileNotFoundError:
         return None
+    except OSError as error:
+        raise OutputError(f"{path}: cache: {error.strerror}: delete the folder's .cache") from error
     digest, body = data[:_DIGEST_BYTES], data[_DIGEST_BYTES:]
     if hashlib.sha256(body).digest() != digest:
         return None
     try:
-        return (_Unpickler(io.BytesIO(body)).load(),)
+        return _Unpickler(io.BytesIO(body)).load(), digest.hex()
     except OutputError:
         raise
     except Exception as error:  # a pickle that somebody made can raise anything

@@ -78,13 +78,22 @@ class ReconstructOptions:
 
 @dataclass(frozen=True)
 class Stage:
-    """One step: `run(*results of needs, options)` gives its result; `share` is its usual part of the time."""
+    """One step: `run(*results of needs, options)` gives its result.
+
+    Attributes
+    ----------
+    share : its usual part of the time.
+    told : the options that it is told, all others being as if not given; None: all.
+    seen : what it is shown of the capture, given the options it is told; such a stage reads the photographs.
+    """
 
     name: str
     text: str
     needs: tuple[str, ...]
     run: Callable[..., Any]
     share: float = 1.0
+    told: Callable[[ReconstructOptions], ReconstructOptions] | None = None
+    seen: Callable[[Capture, ReconstructOptions], Capture] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,9 +138,9 @@ def reconstruct(
     return Reconstruction(model=results["check"], capture=results["capture"], parts=results["identify"])
 
 
-def stage_cache(capture: Path, options: ReconstructOptions, out: OutputFolder) -> StageCache:
-    """The cache in an output folder, for this capture and these options."""
-    return StageCache(out.cache, lambda: f"{program_hash()} {options} {folder_hash(capture, leave_out=out.path)}")
+def stage_cache(capture: Path, out: OutputFolder) -> StageCache:
+    """The cache in an output folder, for this capture."""
+    return StageCache(out.cache, program_hash, lambda: folder_hash(capture, leave_out=out.path))
 
 
 def run_stages(
@@ -147,12 +156,46 @@ def run_stages(
     reporter.plan({stage.name: stage.share for stage in stages} | AFTERWARDS)
     for stage in stages:
         with reporter.stage(stage.name, stage.text):
-            run = partial(stage.run, *(results[name] for name in stage.needs), options)
-            results[stage.name], kept = cache.get(stage.name, stage.needs, run)
+            results[stage.name], kept = _result(stage, results, options, cache)
             if kept:
                 reporter.reuse(stage.name)
     cache.prune()
     return results
+
+
+def _result(stage: Stage, results: dict[str, Any], options: ReconstructOptions, cache: StageCache) -> tuple[Any, bool]:
+    """The stage's result, and whether it was kept; its key is made of nothing but what the stage is told and shown."""
+    told = stage.told(options) if stage.told else options
+    given = {name: results[name] for name in stage.needs}
+    if not stage.seen:
+        return cache.get(stage.name, stage.needs, partial(stage.run, *given.values(), told), lambda: repr(told))
+    seen = given["capture"] = stage.seen(given["capture"], told)
+    needs = [name for name in stage.needs if name != "capture"]
+    run = partial(stage.run, *given.values(), told)
+    return cache.get(stage.name, needs, run, lambda: f"{told} {_content_hash(seen)}")
+
+
+def _content_hash(capture: Capture) -> str:
+    from kerfwright.capture.content import content_hash
+
+    return content_hash(capture)
+
+
+def _told(*names: str) -> Callable[[ReconstructOptions], ReconstructOptions]:
+    """Only these options."""
+    return lambda options: ReconstructOptions(**{name: getattr(options, name) for name in names})
+
+
+def _told_refine(options: ReconstructOptions) -> ReconstructOptions:
+    """Lengths give a scale, which refinement needs only to snap thicknesses."""
+    return _told("seed", "without", *(("stock", "length") if options.stock else ()))(options)
+
+
+def _seen(capture: Capture, options: ReconstructOptions) -> Capture:
+    """Without scale and place, but where thicknesses are snapped to millimetres."""
+    from kerfwright.capture.content import unscaled
+
+    return capture if options.stock else unscaled(capture)
 
 
 def _capture(path: Path, options: ReconstructOptions) -> Capture:
@@ -253,12 +296,14 @@ def _check(refined: Refined, parts: Parts, capture: Capture, options: Reconstruc
 
 
 STAGES: tuple[Stage, ...] = (
-    Stage("capture", "Reading the capture", ("path",), _capture, 0.02),
-    Stage("identify", "Finding boards in the cloud", ("capture",), _identify, 0.3),
-    Stage("assemble", "Finding how the boards meet", ("identify", "capture"), _assemble, 0.1),
-    Stage("refine", "Tracing cut paths in the photographs", ("assemble", "identify", "capture"), _refine, 0.35),
+    Stage("capture", "Reading the capture", ("path",), _capture, 0.02,
+          _told("up", "millimetres_per_unit", "crop", "ground", "markers")),
+    Stage("identify", "Finding boards in the cloud", ("capture",), _identify, 0.3, _told("seed"), _seen),
+    Stage("assemble", "Finding how the boards meet", ("identify", "capture"), _assemble, 0.1, _told(), _seen),
+    Stage("refine", "Tracing cut paths in the photographs", ("assemble", "identify", "capture"), _refine, 0.35,
+          _told_refine, _seen),
     Stage("check", "Building solids and checking them", ("refine", "identify", "capture"), _check, 0.13),
-)
+)  # fmt: skip
 AFTERWARDS = {"write": 0.1}  # writing is no stage, but takes its part of the time
 
 

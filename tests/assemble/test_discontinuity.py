@@ -83,9 +83,9 @@ def made_photos(shade) -> SimpleNamespace:
     def project(x):
         return x[:, :2], np.ones(len(x))
 
-    def colours(k, pixels):
-        noise = np.random.default_rng(k).normal(0, 1.0, (*pixels.shape[:-1], 3))
-        return (shade(pixels[..., 0], pixels[..., 1])[..., None] + noise).astype(np.float32)
+    def colours(k, places):
+        noise = np.random.default_rng(k).normal(0, 1.0, places.shape)
+        return (shade(places[..., 0], places[..., 1])[..., None] + noise).astype(np.float32)
 
     views = [SimpleNamespace(centre=np.array([180.0, 75 + 20 * k, 900.0]), project=project) for k in range(5)]
     return SimpleNamespace(views=views, colours=colours)

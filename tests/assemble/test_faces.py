@@ -29,10 +29,10 @@ class Grain:
     def _to(a: float, b: float):
         return lambda x: (x[:, :2] + x[:, 2:] * np.array([a, b]), x[:, 2])
 
-    def colours(self, k: int, pixels: np.ndarray) -> np.ndarray:
-        on_face = pixels - TOP * np.array(self.tilts[k])
+    def colours(self, k: int, places: np.ndarray) -> np.ndarray:
+        on_face = self.views[k].project(places.reshape(-1, 3))[0] - TOP * np.array(self.tilts[k])
         grey = 100 + 10 * np.cos(on_face @ self.waves.T + self.phases).sum(axis=1)
-        return np.repeat(grey[:, None], 3, axis=1)
+        return np.repeat(grey[:, None], 3, axis=1).reshape(places.shape)
 
 
 def board_with_points(height: float):

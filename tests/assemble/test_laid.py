@@ -5,9 +5,10 @@ import pytest
 
 from clouds import pose, sheet
 from kerfwright.assemble import AssembleOptions
-from kerfwright.assemble.laid import laid_contacts, laid_on
+from kerfwright.assemble.laid import laid_contacts
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.freespace import FreeSpace
+from kerfwright.identify.laid import laid_on
 from kerfwright.model import Origin, Quantity
 
 BLIND = FreeSpace((), (), 1.0, 1.0)

@@ -80,7 +80,8 @@ def test_a_plain_face_stands_out_nowhere(tmp_path):
 def test_colours_are_read_at_pixel_centres_and_are_missing_outside(tmp_path):
     photos = photos_of(tmp_path, noise=0.0)
     pixels = np.array([[[10.5, 100.5], [300.5, 100.5], [-3.0, 50.0], [500.0, 50.0]]])
-    colours = photos.colours(0, pixels)
+    on_plane = pixels - [160, 120] - photos.views[0].camera_from_world[:2, 3]  # a pixel is a millimetre at z = 0
+    colours = photos.colours(0, np.concatenate([on_plane, np.zeros((1, 4, 1))], axis=2))
     assert colours.shape == (1, 4, 3)
     assert colours[0, :2, 0] == pytest.approx([180, 60])
     assert np.isnan(colours[0, 2:]).all()

@@ -28,12 +28,12 @@ class Painted:
         self.views = [FromAbove(np.array([50.0 * k, 30.0, 1e5])) for k in range(views)]
         self._tone, self._grain = tone, grain
 
-    def colours(self, k: int, pixels: np.ndarray) -> np.ndarray:
-        """(..., 2) to (..., 3) RGB."""
-        xy = pixels.reshape(-1, 2)
+    def colours(self, k: int, places: np.ndarray) -> np.ndarray:
+        """(..., 3) to (..., 3) RGB."""
+        xy = self.views[k].project(places.reshape(-1, 3))[0]
         noise = np.random.default_rng(k).normal(0, self._grain, len(xy))
         tones = self._tone(xy[:, 0], xy[:, 1]) + noise
-        return np.repeat(tones[:, None], 3, axis=1).reshape(*pixels.shape[:-1], 3)
+        return np.repeat(tones[:, None], 3, axis=1).reshape(places.shape)
 
 
 def nothing_hides() -> Obstacles:

@@ -33,7 +33,7 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
 
     options = options or AssembleOptions()
     diameter = capture.cloud.diameter
-    sheets, _ = align_sheets(parts.sheets, capture.cloud, options)
+    sheets, _ = align_sheets(parts.start, capture.cloud, options)
     free = see_through(capture, parts.spacing, max(5 * parts.noise, diameter / 150))
     photos = Photos(capture)
     if options.rough:
@@ -71,9 +71,9 @@ def _with_hidden_faces(
     from kerfwright.assemble.backs import measured_backs
     from kerfwright.assemble.covered import backed_by_ends
     from kerfwright.assemble.flush import flush_neighbours
-    from kerfwright.assemble.laid import laid_on
     from kerfwright.assemble.stock import share_thickness
     from kerfwright.identify.gaps import mended
+    from kerfwright.identify.laid import laid_on
 
     sheets = measured_backs(sheets, photos, cloud.diameter, options)
     sheets = backed_by_ends(mended(sheets, cloud, free, options), cloud.diameter, options)
@@ -88,8 +88,8 @@ def _snapped(
     """The boards of stock thicknesses, with their contacts and segments on the faces that they then have."""
     from kerfwright.assemble.constraints import constraint_segments
     from kerfwright.assemble.flush import flush_neighbours
-    from kerfwright.assemble.laid import laid_on
     from kerfwright.assemble.snap import moved_with, snapped_to_stock
+    from kerfwright.identify.laid import laid_on
 
     sheets = flush_neighbours(snapped_to_stock(sheets, decided, noise, options), cloud.diameter, options)
     sheets = laid_on(sheets, cloud, free, options)

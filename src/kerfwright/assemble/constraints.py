@@ -10,7 +10,8 @@ from kerfwright.assemble.decided import Decided
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.assemble.severing import severs
 from kerfwright.assemble.types import ConstraintSegment
-from kerfwright.identify.joints import Joint, Trace, columns, face_plane, runs_of, trace_of
+from kerfwright.identify.joints import Joint, Trace, face_plane, trace_of
+from kerfwright.identify.run_on import floor_runs, floor_trace
 from kerfwright.identify.types import Sheet
 
 __all__ = ["constraint_segments"]
@@ -107,18 +108,8 @@ def _outer_trace(sheets: tuple[Sheet, ...], d: Decided) -> Trace | None:
 
 def _ground(sheet: Sheet, contacts: list[Joint], diameter: float, options: AssembleOptions) -> list[ConstraintSegment]:
     """Where the board stands on the floor z = 0, unless it ends on another board there."""
-    trace = trace_of(sheet, np.array([0.0, 0, 1]), 0.0)
+    trace = floor_trace(sheet)
     if trace is None:
         return []
-    step = diameter / 200
-    along, first, _ = columns(sheet.region, trace, step)
-    standing = np.abs(first) < options.ground_reach * diameter
-    if standing.any() and not options.rough:  # where a traced outline is higher than elsewhere, an arch begins
-        standing &= first < 2 * max(float(np.median(first[standing])), 0.0) + options.outline_error * diameter
-    for joint in contacts:
-        if joint.trace.m @ trace.m > 0.9:
-            for low, high in joint.intervals:
-                ends = (joint.trace.place(np.zeros(2), np.array([low, high])) @ trace.tangent)
-                standing &= ~((along > ends.min() - 4 * step) & (along < ends.max() + 4 * step))
-    runs = runs_of(along, standing, step, options.min_contact * diameter, joining=2 * step)
+    runs = floor_runs(sheet, trace, contacts, diameter, options, traced=not options.rough)
     return _segments(trace, runs, "ground", None)

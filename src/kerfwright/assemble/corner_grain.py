@@ -134,7 +134,7 @@ def _tone(
     seen = obstacles.visible([photos.views[k] for k in picked], world, outward, FACING / 2)
     tones = []
     for k, shown in zip(picked, seen, strict=True):
-        grey = photos.colours(k, np.nan_to_num(photos.views[k].project(world)[0], nan=-1.0)).mean(axis=1)
+        grey = photos.colours(k, world).mean(axis=1)
         grey = np.where(shown, np.log(np.maximum(grey, 2.0)), np.nan)
         tones.append(grey - np.nanmedian(grey) if np.isfinite(grey).any() else grey)
     told = np.isfinite(tones)

@@ -166,8 +166,7 @@ def _facing(photos: Photos, places: np.ndarray, normal: np.ndarray) -> list[int]
 def _grain(photos: Photos, k: int, places: np.ndarray, normal: np.ndarray, offsets: np.ndarray) -> np.ndarray:
     """(T, W, P) grey values of a view in each window at each offset, with mean 0 and deviation 1; NaN where flat."""
     x = places[None] + offsets[:, None, None, None] * normal
-    pixels, _ = photos.views[k].project(x.reshape(-1, 3))
-    grey = photos.colours(k, np.nan_to_num(pixels, nan=-1.0)).mean(axis=1).reshape(x.shape[:3])
+    grey = photos.colours(k, x).mean(axis=3)
     grey = grey - grey.mean(axis=2, keepdims=True)
     deviation = np.sqrt((grey**2).mean(axis=2, keepdims=True))
     return grey / np.where(deviation > CONTRAST, deviation, np.nan)
@@ -175,7 +174,7 @@ def _grain(photos: Photos, k: int, places: np.ndarray, normal: np.ndarray, offse
 
 def _agreement(a: np.ndarray, b: np.ndarray) -> np.ndarray | None:
     """(T,) correlation of two views over the windows that both show."""
-    each = (a * b).mean(axis=2)
+    each = np.einsum("twp,twp->tw", a, b) / a.shape[2]
     told = np.isfinite(each).all(axis=0)
     each = each[:, told]
     each = each[:, each.max(axis=0, initial=-1.0) > AGREEMENT]

@@ -26,5 +26,4 @@ class AssembleOptions(WholeOptions):
     stock: Stock = Stock()
     stock_sigmas: float = 2.0  # standard errors within which exactly one stock size must lie
     thickness_floor: float = 1 / 1500  # least standard error of a thickness: eased edges hide part of it
-    flush: float = 1 / 1000  # sheet planes of neighbours that differ by less are one
     seed: int = 0

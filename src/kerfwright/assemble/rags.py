@@ -19,7 +19,7 @@ from shapely.geometry import Polygon
 from kerfwright.assemble.covered import end_sections
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.capture.types import Cloud
-from kerfwright.identify.coplanar import in_one_plane, moved_region
+from kerfwright.identify.coplanar import in_one_plane, moved_region, united
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.gaps import is_seen, is_thin, places_in, usual_density
 from kerfwright.identify.outlines import largest_piece
@@ -79,11 +79,8 @@ def _joined(a: Sheet, b: Sheet, sheets: Sequence[Sheet], scene: _Scene) -> Sheet
         return None
     region = largest_piece(shapely.union_all([a.region, other, gap]).buffer(0.05))
     better = min((a, b), key=lambda s: s.thickness.standard_error or np.inf)
-    top, bottom = (b.top_idx, b.bottom_idx) if a.normal @ b.normal > 0 else (b.bottom_idx, b.top_idx)
     return replace(
-        a, region=region, thickness=better.thickness, thickness_seen=a.thickness_seen or b.thickness_seen,
-        top_idx=np.union1d(a.top_idx, top), bottom_idx=np.union1d(a.bottom_idx, bottom),
-        cut_idx=np.union1d(a.cut_idx, b.cut_idx),
+        united(a, b, region), thickness=better.thickness, thickness_seen=a.thickness_seen or b.thickness_seen
     )
 
 

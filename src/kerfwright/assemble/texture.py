@@ -99,8 +99,7 @@ def _inside(sheet: Sheet, m: np.ndarray, offsets: np.ndarray, middles: np.ndarra
 
 def _read(photos: Photos, k: int, world: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """One view's strips (U, C, 3), about their own middle: exposures differ."""
-    pixels, _ = photos.views[k].project(world)
-    colours = photos.colours(k, np.nan_to_num(pixels, nan=-1.0))
+    colours = photos.colours(k, world)
     strips = np.log(np.maximum(colours, DARKEST)).reshape(*shape, READ, 3).mean(axis=2)
     known = strips[np.isfinite(strips[..., 0])]
     return strips - np.median(known, axis=0) if len(known) else strips

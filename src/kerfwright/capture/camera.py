@@ -113,13 +113,23 @@ class Camera:
             back = np.flatnonzero(~(np.diff(r * self._radial(r * r)) > 0))
         return float(r[back[0]]) if len(back) else np.inf
 
+    @cached_property
+    def lens(self) -> np.ndarray:
+        """All that projects, as compiled code takes it; see `kerfwright.capture._lens`."""
+        from kerfwright.capture._lens import EQUIDISTANT as ANGLES
+        from kerfwright.capture._lens import PINHOLE, POLYNOMIAL
+        from kerfwright.capture._lens import RATIONAL as FRACTION
+
+        kind = POLYNOMIAL if self.distortion.any() else PINHOLE
+        kind = ANGLES if self.model in EQUIDISTANT else FRACTION if self.model in RATIONAL else kind
+        diagonal, middle = np.diag(self.matrix)[:2], self.matrix[:2, 2]
+        return np.array([*diagonal, *middle, *self.distortion[:9], self.fold**2, kind])
+
     def project(self, x_in_camera: np.ndarray) -> np.ndarray:
         """(N, 3) camera to (N, 2) pixels; NaN where z <= 0, and beyond the fold."""
-        z = np.where(x_in_camera[:, 2] > 0, x_in_camera[:, 2], np.nan)
-        ideal = x_in_camera[:, :2] / z[:, None]
-        if np.isfinite(self.fold):
-            ideal = np.where(np.einsum("ij,ij->i", ideal, ideal)[:, None] < self.fold**2, ideal, np.nan)
-        return self.distort(ideal) * np.diag(self.matrix)[:2] + self.matrix[:2, 2]
+        from kerfwright.capture._lens import project_points
+
+        return project_points(np.asarray(x_in_camera, float), np.eye(4), self.lens)[0]
 
     def undistort(self, pixels: np.ndarray, steps: int = 20) -> np.ndarray:
         """(N, 2) pixels to (N, 2) ideal coordinates on the plane z = 1.

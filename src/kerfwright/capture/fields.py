@@ -141,8 +141,9 @@ def rigid(turn: np.ndarray, centre: np.ndarray, path: Path, field: str) -> np.nd
 
 def read_json(path: Path) -> Fields:
     """The object that a JSON file holds."""
+    text = "\n".join(read_lines(path))
     try:
-        content = json.loads("\n".join(read_lines(path)))
+        content = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise capture_error(path, "JSON", " ".join(str(error).split()), "export the file again") from None
     return Fields(content, path, "")
@@ -151,7 +152,8 @@ def read_json(path: Path) -> Fields:
 def read_xml(path: Path) -> ElementTree.Element:
     """The root of an XML file without entities of its own, which no camera file has and which can grow without end."""
     data = read_bytes(path)
-    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
+    plain = data.replace(b"\0", b"")  # as it is in UTF-16, too
+    if b"<!DOCTYPE" in plain or b"<!ENTITY" in plain:
         raise capture_error(path, "XML", "<!DOCTYPE", "no camera file has a document type: export the file again")
     try:
         return ElementTree.fromstring(data)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from kerfwright.capture.frame import moved, up_rotation
-from kerfwright.capture.images import ImageFinder, image_size
+from kerfwright.capture.images import ImageFinder, check_photograph, image_size
 from kerfwright.capture.normals import normals_or_estimates
 from kerfwright.capture.parsing import capture_error, shown
 from kerfwright.capture.posed import LARGEST_NUMBER, PosedImage
@@ -114,6 +114,7 @@ def _view(image: PosedImage, path: Path) -> View:
             "{}x{}".format(*size),
             f"its camera says {image.camera.width}x{image.camera.height}: use the images the cameras were computed for",
         )
+    check_photograph(path, size)
     return View(image.name, path, image.camera, image.camera_from_capture)
 
 

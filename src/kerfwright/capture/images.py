@@ -10,14 +10,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
-from kerfwright.capture.parsing import capture_error
+from kerfwright.capture.parsing import capture_error, read_bytes
 
-__all__ = ["ImageFinder", "Locate", "image_size"]
+__all__ = ["ImageFinder", "Locate", "check_photograph", "image_size"]
 
 Locate = Callable[[str], Path | None]  # the file of an image's name, None where it is missing
 
 SUFFIXES = frozenset({".jpg", ".jpeg", ".png", ".tif", ".tiff"})
 JPEG_SIZE_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # start of frame; ITU-T T.81, table B.1
+JPEG_SCAN, JPEG_END = 0xDA, b"\xff\xd9"
+MOST_PIXELS = 1 << 28  # of one photograph, decoded .75 GiB; the largest sensors of phones have 200 million
 TIFF_WIDTH, TIFF_HEIGHT, TIFF_SHORT, TIFF_LONG = 256, 257, 3, 4  # TIFF 6.0, section 8
 
 
@@ -120,6 +122,30 @@ def image_size(path: Path) -> tuple[int, int]:
         raise capture_error(
             path, "image", "no size in its header", "check that the file is a whole JPEG, PNG or TIFF"
         ) from None
+
+
+def check_photograph(path: Path, size: tuple[int, int]) -> None:
+    """Refuse what is larger than memory should be given for, and a JPEG whose end is missing, which comes out grey.
+
+    Raises
+    ------
+    CaptureError
+        If the photograph is one of these, or cannot be read.
+    """
+    if size[0] * size[1] > MOST_PIXELS:
+        raise capture_error(path, "image size", "{}x{}".format(*size), f"at most {MOST_PIXELS} pixels: shrink it")
+    data = read_bytes(path)
+    if data[:2] == b"\xff\xd8" and JPEG_END not in data[_first_scan(data) :]:
+        raise capture_error(path, "image", "cut short", "copy or export it again")
+
+
+def _first_scan(data: bytes) -> int:
+    """Where the pixels of a JPEG begin, or its end; previews, which are JPEGs themselves, lie in segments before."""
+    at = 2
+    while at + 4 <= len(data) and data[at] == 0xFF and data[at + 1] != JPEG_SCAN:
+        alone = data[at + 1] in (0x01, 0xFF) or 0xD0 <= data[at + 1] <= 0xD8  # fill bytes, markers without a segment
+        at += 1 + (data[at + 1] != 0xFF) if alone else 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+    return at
 
 
 def _size(file: BinaryIO) -> tuple[int, int]:

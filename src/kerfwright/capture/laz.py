@@ -6,6 +6,7 @@ lazrs and nothing else, so that it costs no more than starting Python does; lasp
 
 from __future__ import annotations
 
+import errno
 import os
 import struct
 import subprocess
@@ -87,7 +88,9 @@ def _unpacked(path: Path, header: Any, record: bytes, plain: Path) -> np.ndarray
     memory = UNPACK_ROOM + path.stat().st_size + UNPACK_COPIES * count * length
     code, said = _run_unpack([str(v) for v in (path, header.offset_to_point_data, count, plain, memory)], record)
     if code != 0:
-        raise capture_error(path, "file", _reason(code, said), REMEDY)
+        full = os.strerror(errno.ENOSPC).encode() in said
+        remedy = f"free some space in {plain.parent.parent}" if full else REMEDY
+        raise capture_error(path, "file", _reason(code, said), remedy)
     if plain.stat().st_size != count * length:
         raise capture_error(path, "packing", f"{plain.stat().st_size} bytes, {count} points of {length}", REMEDY)
     return np.fromfile(plain, header.point_format.dtype())

@@ -74,6 +74,9 @@ def read_lines(path: Path) -> list[str]:
         If the file cannot be read or is not UTF-8.
     """
     data = read_bytes(path)
+    zero = data.find(b"\0")  # in no text, but in UTF-16 without a byte order mark
+    if zero >= 0:
+        raise capture_error(path, f"byte {zero}", data[zero : zero + 4], "save the file as UTF-8")
     try:
         return data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n").split("\n")
     except UnicodeDecodeError as error:

@@ -106,7 +106,10 @@ def _columns(las, names: dict[str, str], choices: tuple[tuple[str, ...], ...]) -
 
 def _e57(pye57: ModuleType, path: Path) -> RawCloud:
     file = pye57.E57(str(path))
-    check_count(sum(file.get_header(k).point_count for k in range(file.scan_count)), path, "points")
+    count = sum(file.get_header(k).point_count for k in range(file.scan_count))
+    check_count(count, path, "points")
+    if count > 8 * path.stat().st_size:  # a point takes a bit at least
+        raise capture_error(path, "points", count, "more than the file can hold: copy or export it again")
     scans = [file.read_scan(k, colors=True, ignore_missing_fields=True) for k in range(file.scan_count)]
     if not scans:
         raise capture_error(path, "scans", 0, "export the cloud again")

@@ -45,8 +45,9 @@ class View:
 
     def project(self, x_in_world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(N, 3) world to (N, 2) pixels, distortion included, and (N,) depth; pixels are NaN where depth <= 0."""
-        x_in_camera = self.to_camera(x_in_world)
-        return self.camera.project(x_in_camera), x_in_camera[:, 2]
+        from kerfwright.capture._lens import project_points
+
+        return project_points(np.asarray(x_in_world, float), self.camera_from_world, self.camera.lens)
 
     def image(self) -> np.ndarray:
         """The photograph, (height, width, 3) uint8 RGB, shrunk, but distorted as on disk. Read anew at each call.
@@ -70,7 +71,10 @@ class View:
     def _as_on_disk(self) -> np.ndarray:
         import cv2
 
-        pixels = cv2.imread(str(self.path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+        try:
+            pixels = cv2.imread(str(self.path), cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION)
+        except cv2.error:  # more pixels than OpenCV takes
+            pixels = None
         if pixels is None:
             raise CaptureError(f"{self.path}: image: cannot be read: check that the file is a whole JPEG, PNG or TIFF")
         return cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB)

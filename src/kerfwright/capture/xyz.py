@@ -64,7 +64,8 @@ def _table(lines: list[str], path: Path, start: int) -> np.ndarray:
             return np.loadtxt([line.strip().strip(",;") for line in lines], delimiter=between, ndmin=2, comments=None)
     except (ValueError, UserWarning) as error:
         reason = " ".join(str(error).split())
-        raise capture_error(path, f"after line {start}", reason, "as many numbers on each line: export again") from None
+        remedy = "as many numbers on each line" + (", with decimal points, not commas" if "," in lines[0] else "")
+        raise capture_error(path, f"after line {start}", reason, f"{remedy}: export again") from None
 
 
 def _named(table: np.ndarray, heading: list[str]) -> RawCloud:

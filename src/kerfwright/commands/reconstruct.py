@@ -141,7 +141,7 @@ def _reconstruct_into(
             write_results(found, partial)
         write_run(reporter, partial / "run.json")
 
-    found = pipeline.reconstruct(capture, options, reporter, pipeline.stage_cache(capture, options, folder))
+    found = pipeline.reconstruct(capture, options, reporter, pipeline.stage_cache(capture, folder))
     folder.write(fill)
     return found.model.findings
 

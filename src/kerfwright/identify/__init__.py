@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from kerfwright.capture.types import Capture, Cloud
+from kerfwright.capture.types import Capture
 from kerfwright.errors import StageError
 from kerfwright.identify.options import IdentifyOptions
 from kerfwright.identify.types import Parts, Primitive, Sheet
 
 if TYPE_CHECKING:
+    from kerfwright.capture.types import Cloud
+    from kerfwright.identify.freespace import FreeSpace
+    from kerfwright.identify.photo_edges import Photos
     from kerfwright.identify.primitives import Neighbourhood
     from kerfwright.identify.selection import Evidence, Selection
     from kerfwright.identify.slabs import Slab
@@ -26,8 +29,10 @@ class Candidates:
     in rags, and are boards where nothing else is.
     """
 
-    cloud: Cloud
+    capture: Capture
     around: Neighbourhood
+    free: FreeSpace
+    photos: Photos
     planes: list[Primitive]
     slabs: list[Slab]
     dark: list[Slab]
@@ -56,21 +61,24 @@ def find_candidates(capture: Capture, options: IdentifyOptions) -> Candidates:
     around = look_around(cloud, options)
     planes = find_planes(cloud, around, options)
     free = see_through(capture, around.spacing, max(5 * around.noise, cloud.diameter / 150))
-    slabs = candidate_slabs(capture, around, planes, free, Photos(capture), options)
+    photos = Photos(capture)
+    slabs = candidate_slabs(capture, around, planes, free, photos, options)
     if not slabs:
         raise StageError(
             "cloud: no plane has a thickness that a board could have: photograph the edges of the boards too"
         )
     dark = dark_slabs(capture, around, planes, free, options)
-    return Candidates(cloud, around, planes, slabs, dark, gather_evidence(cloud, around, slabs, options))
+    evidence = gather_evidence(cloud, around, slabs, options)
+    return Candidates(capture, around, free, photos, planes, slabs, dark, evidence)
 
 
 def choose(found: Candidates, options: IdentifyOptions) -> Parts:
     """The second half of `identify`: the boards among the candidates; raises StageError when there are none."""
     from kerfwright.identify.dark import with_dark_boards
     from kerfwright.identify.sheets import join_across, to_sheet
+    from kerfwright.identify.whole import made_whole
 
-    cloud, around, slabs = found.cloud, found.around, found.slabs
+    cloud, around, slabs = found.capture.cloud, found.around, found.slabs
     selection = _selected(cloud, slabs, found.evidence, options)
     if not selection.chosen:
         raise StageError("cloud: no set of boards explains it: check that the cloud shows one wooden object, cropped")
@@ -78,14 +86,15 @@ def choose(found: Candidates, options: IdentifyOptions) -> Parts:
     boards = with_dark_boards([slabs[k] for k in selection.chosen], found.dark, found.planes, cloud, reach)
     chosen = join_across(boards, reach)
     chosen.sort(key=lambda s: (-round(s.region.area), *s.world_from_board[:3, 3].round(3)))
-    sheets = tuple(to_sheet(f"board_{k + 1:02d}", slab, cloud, around, options) for k, slab in enumerate(chosen))
+    seen = tuple(to_sheet(f"board_{k + 1:02d}", slab, cloud, around, options) for k, slab in enumerate(chosen))
+    sheets = made_whole(seen, cloud, found.photos, found.free, options.whole)
     figures = {
         "candidates": len(slabs), "chosen": len(selection.chosen), "objective": selection.objective,
         "bound": selection.bound, "explained": selection.explained, "method": selection.method,
         "energy": selection.energy,
     }
     notes = _notes(selection.explained, options.least_explained)
-    return Parts(sheets, tuple(found.planes), around.noise, around.spacing, notes, figures)
+    return Parts(sheets, tuple(found.planes), around.noise, around.spacing, notes, figures, seen)
 
 
 def _selected(cloud: Cloud, slabs: list[Slab], evidence: Evidence, options: IdentifyOptions) -> Selection:

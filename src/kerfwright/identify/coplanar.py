@@ -10,7 +10,7 @@ from shapely.geometry import Polygon
 
 from kerfwright.identify.types import Sheet
 
-__all__ = ["in_one_plane", "moved_region", "with_own_points"]
+__all__ = ["in_one_plane", "moved_region", "united", "with_own_points"]
 
 PARALLEL = 1 - 1e-6  # cosine between pieces of one board, once aligned
 
@@ -32,6 +32,13 @@ def moved_region(sheet: Sheet, to: Sheet) -> Polygon:
         return to.to_board(sheet.to_world(np.c_[xy, np.zeros(len(xy))]))[:, :2]
 
     return Polygon(ring(sheet.region.exterior.coords), [ring(r.coords) for r in sheet.region.interiors]).buffer(0)
+
+
+def united(a: Sheet, b: Sheet, region: Polygon) -> Sheet:
+    """Two pieces of one board, in the frame of the first: a region, and the points of both."""
+    top, bottom = (b.top_idx, b.bottom_idx) if a.normal @ b.normal > 0 else (b.bottom_idx, b.top_idx)
+    return replace(a, region=region, top_idx=np.union1d(a.top_idx, top), bottom_idx=np.union1d(a.bottom_idx, bottom),
+                   cut_idx=np.union1d(a.cut_idx, b.cut_idx))
 
 
 def with_own_points(piece: Sheet, points: np.ndarray, slack: float) -> Sheet:

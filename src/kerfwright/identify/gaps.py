@@ -20,13 +20,14 @@ from kerfwright.identify.options import WholeOptions
 from kerfwright.identify.outlines import largest_piece
 from kerfwright.identify.types import Sheet
 
-__all__ = ["is_seen", "is_thin", "mended", "places_in", "usual_density"]
+__all__ = ["filled_out", "is_seen", "is_thin", "mended", "places_in", "usual_density"]
 
 LINED = 0.15  # of a gap's outline; beyond, cut faces show that it is real
 SEEN = 0.3  # of a gap's area; beyond, it was seen through
 USUAL = 0.75  # quantile of the boards' densities that counts as seen well
 DENSE = 0.6  # of that density: a gap in such wood is real
 SAMPLES = 60
+RAGS = 0.35  # of the points of faces seen well, at most, that a board has which is seen in rags
 
 
 def mended(sheets: tuple[Sheet, ...], cloud: Cloud, free: FreeSpace, options: WholeOptions) -> tuple[Sheet, ...]:
@@ -34,6 +35,19 @@ def mended(sheets: tuple[Sheet, ...], cloud: Cloud, free: FreeSpace, options: Wh
     reach, near = options.veil * cloud.diameter, options.end_offset * 2 * cloud.diameter
     dense = usual_density(sheets, cloud)
     return tuple(_mended(sheet, cloud, free, reach, near, dense) for sheet in sheets)
+
+
+def filled_out(sheets: tuple[Sheet, ...], cloud: Cloud, free: FreeSpace, options: WholeOptions) -> tuple[Sheet, ...]:
+    """The sheets, those that are seen in rags with every bay of their outline filled that is only a gap of the cloud.
+
+    What stereo shows of a board in the dark says that there is wood, and nothing of where it ends.
+    """
+    near, dense = options.end_offset * 2 * cloud.diameter, usual_density(sheets, cloud)
+    return tuple(
+        _filled(sheet, sheet.region.convex_hull, cloud, free, near, dense)
+        if len(_face(sheet, cloud)) < RAGS / DENSE * dense * sheet.region.area else sheet
+        for sheet in sheets
+    )
 
 
 def usual_density(sheets: Sequence[Sheet], cloud: Cloud) -> float:
@@ -47,11 +61,17 @@ def _face(sheet: Sheet, cloud: Cloud) -> np.ndarray:
 
 
 def _mended(sheet: Sheet, cloud: Cloud, free: FreeSpace, reach: float, near: float, dense: float) -> Sheet:
-    """reach: mm, half the width of a gap that is looked at; near: mm about an outline where cut faces line it; dense:
-    points a mm2 of a face seen well.
-    """
+    """reach: mm, half the width of a gap that is looked at."""
     closed = sheet.region.buffer(reach, join_style="mitre").buffer(-reach, join_style="mitre").union(sheet.region)
     whole = shapely.union_all([closed, *(Polygon(ring) for ring in sheet.region.interiors)])
+    return _filled(sheet, whole, cloud, free, near, dense)
+
+
+def _filled(sheet: Sheet, whole: Polygon, cloud: Cloud, free: FreeSpace, near: float, dense: float) -> Sheet:
+    """The sheet with what it lacks of a whole region, where that is only a gap of the cloud.
+
+    near: mm about an outline where cut faces line it; dense: points a mm2 of a face seen well.
+    """
     outline, gaps = whole.boundary, whole.difference(sheet.region)
     cut = sheet.to_board(cloud.points[sheet.cut_idx])[:, :2]
     tree = cKDTree(cut) if len(cut) else None

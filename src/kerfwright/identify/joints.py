@@ -7,6 +7,7 @@ within reach of the plane on its outer side and does not go on behind a. Columns
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import shapely
@@ -171,7 +172,15 @@ def _has_wood(one: Sheet, other: Sheet, trace: Trace, along: np.ndarray, reach: 
     shift = trace.slope * (other.thickness.value / 2 - trace.depth)
     middle[:, :2] += shift * trace.m
     in_a = one.to_board(other.to_world(middle))
-    return shapely.contains_xy(one.region.buffer(reach), in_a[:, 0], in_a[:, 1])
+    return shapely.contains_xy(_widened(one.region, reach), in_a[:, 0], in_a[:, 1])
+
+
+@lru_cache(maxsize=256)
+def _widened(region: Polygon, reach: float) -> Polygon:
+    """A region with a margin; every other board asks for the same."""
+    wide = region.buffer(reach)
+    shapely.prepare(wide)
+    return wide
 
 
 def runs_of(

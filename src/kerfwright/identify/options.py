@@ -12,6 +12,29 @@ SELECTIONS, ENERGIES = ("exact", "annealing"), ("total", "mean")
 
 
 @dataclass(frozen=True)
+class WholeOptions:
+    """How boards are made whole that the cloud shows in part; lengths are fractions of the cloud's largest side D."""
+
+    reach: float = 1 / 30  # boards that come this near each other are connected (paper, Connections)
+    square_degrees: float = 3.0  # boards further than this from parallel or square are meant to be tilted
+    square_floor_degrees: float = 0.35  # poses and stereo drift by this much
+    direction_sigmas: float = 3.0
+    ground_reach: float = 1 / 40  # a board that comes this near the floor stands on it
+    outline_error: float = 1 / 60  # how far a rough outline may be off
+    ragged: float = 1 / 60  # ... in the dark, also after it was traced in photographs
+    unseen_reach: float = 1 / 8  # a board that fades out unseen this near another runs on to it
+    far_reach: float = 1 / 2  # ... and this near when the photographs show its end at the plane
+    end_score: float = 2.8  # least edge strength of a clear end
+    rival_score: float = 2.0  # ... of one that lies before the plane and is clearer than the one at it
+    end_excess: float = 0.2  # least share of stretches and views, beyond the usual, that show an end
+    veil: float = 1 / 20  # by which stereo may have run a board on over a dark opening
+    end_offset: float = 1 / 200
+    flush: float = 1 / 1000  # sheet planes of neighbours that differ by less are one
+    passes: int = 2  # ends are looked for again once boards were run on to those found
+    min_contact: float = 1 / 100  # shortest interface
+
+
+@dataclass(frozen=True)
 class IdentifyOptions:
     """What identification may be told; one set serves every object.
 
@@ -43,30 +66,9 @@ class IdentifyOptions:
     annealing_steps: int = 1000  # paper, Part Selection
     annealing_temperatures: tuple[float, float] = (10.0, 0.1)  # first and last; paper, Part Selection
     seed: int = 0
+    whole: WholeOptions = WholeOptions()
 
     def __post_init__(self):
         for name, known in (("selection", SELECTIONS), ("annealing_energy", ENERGIES)):
             if getattr(self, name) not in known:
                 raise OptionError(f"{name}: {getattr(self, name)}: not known: take {' or '.join(known)}")
-
-
-@dataclass(frozen=True)
-class WholeOptions:
-    """How boards are made whole that the cloud shows in part; lengths are fractions of the cloud's largest side D."""
-
-    reach: float = 1 / 30  # boards that come this near each other are connected (paper, Connections)
-    square_degrees: float = 3.0  # boards further than this from parallel or square are meant to be tilted
-    square_floor_degrees: float = 0.35  # poses and stereo drift by this much
-    direction_sigmas: float = 3.0
-    ground_reach: float = 1 / 40  # a board that comes this near the floor stands on it
-    outline_error: float = 1 / 60  # how far a rough outline may be off
-    ragged: float = 1 / 60  # ... in the dark, also after it was traced in photographs
-    unseen_reach: float = 1 / 8  # a board that fades out unseen this near another runs on to it
-    far_reach: float = 1 / 2  # ... and this near when the photographs show its end at the plane
-    end_score: float = 2.8  # least edge strength of a clear end
-    rival_score: float = 2.0  # ... of one that lies before the plane and is clearer than the one at it
-    end_excess: float = 0.2  # least share of stretches and views, beyond the usual, that show an end
-    veil: float = 1 / 20  # by which stereo may have run a board on over a dark opening
-    end_offset: float = 1 / 200
-    passes: int = 2  # ends are looked for again once boards were run on to those found
-    min_contact: float = 1 / 100  # shortest interface

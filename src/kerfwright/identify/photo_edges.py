@@ -25,20 +25,14 @@ class Photos:
     def __init__(self, capture: Capture):
         self.views = capture.views
 
-    def colours(self, k: int, pixels: np.ndarray) -> np.ndarray:
-        """(..., 2) pixel positions to (..., 3) float32 RGB; NaN outside the photograph."""
-        import cv2
+    def colours(self, k: int, x_in_world: np.ndarray) -> np.ndarray:
+        """(..., 3) places to the (..., 3) float32 RGB that view k shows there; NaN outside the photograph."""
+        from kerfwright.capture._lens import read_points
 
         view: View = self.views[k]
-        flat = pixels.reshape(-1, 2).astype(np.float32) - 0.5  # OpenCV puts the first pixel's centre at 0
-        inside = (flat > 0).all(axis=1) & (flat[:, 0] < view.camera.width - 1) & (flat[:, 1] < view.camera.height - 1)
-        rows = 16384  # cv2.remap takes maps of less than 2**15 a side
-        padded = np.zeros((-len(flat) % rows + len(flat), 2), np.float32)
-        padded[: len(flat)] = np.where(inside[:, None], flat, 0)
-        maps = padded.reshape(-1, rows, 2)
-        out = cv2.remap(photograph(view), maps, None, cv2.INTER_LINEAR).reshape(-1, 3)[: len(flat)].astype(np.float32)
-        out[~inside] = np.nan
-        return out.reshape(*pixels.shape[:-1], 3)
+        flat = np.ascontiguousarray(x_in_world, float).reshape(-1, 3)
+        read = read_points(photograph(view), flat, view.camera_from_world, view.camera.lens)
+        return read.reshape(x_in_world.shape)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,9 +86,7 @@ def _view_curves(
     photos: Photos, k: int, grid: np.ndarray, own: np.ndarray, shown: np.ndarray | None, chunk: int, sigma: float
 ) -> list[tuple[int, np.ndarray]]:
     """Edge strength over the offsets, one curve a chunk of places; NaN where something hides a part of the chunk."""
-    view = photos.views[k]
-    pixels, _ = view.project(grid.reshape(-1, 3))
-    colours = photos.colours(k, np.nan_to_num(pixels, nan=-1.0).reshape(*grid.shape[:2], 2))
+    colours = photos.colours(k, grid)
     groups = np.split(np.arange(len(own)), np.flatnonzero(np.diff(own // chunk)) + 1)
     whole = np.isfinite(colours).all(axis=(1, 2))
     groups = [group for group in groups if len(group) >= 0.7 * chunk and whole[group].all()]

@@ -23,7 +23,7 @@ from kerfwright.assemble.splits import (
 )
 from kerfwright.assemble.types import Assembly
 from kerfwright.capture.types import Capture
-from kerfwright.identify.coplanar import in_one_plane, moved_region, with_own_points
+from kerfwright.identify.coplanar import in_one_plane, moved_region, united, with_own_points
 from kerfwright.identify.freespace import see_through
 from kerfwright.identify.outlines import constrained_region, largest_piece
 from kerfwright.identify.photo_edges import Photos
@@ -106,12 +106,9 @@ def _share_wood(a: Sheet, b: Sheet, diameter: float) -> bool:
 def _joined(a: Piece, b: Piece) -> Piece:
     """Two pieces as one, in the frame of the first."""
     region = largest_piece(union_all([a.sheet.region, moved_region(b.sheet, a.sheet)]))
-    names = ("top_idx", "bottom_idx", "cut_idx")
-    theirs = names if a.sheet.normal @ b.sheet.normal > 0 else (names[1], names[0], names[2])
-    idx = {n: np.union1d(getattr(a.sheet, n), getattr(b.sheet, m)) for n, m in zip(names, theirs, strict=True)}
     loops = tuple(replace(loop, points=_moved(loop.points, b.sheet, a.sheet)) for loop in b.outline.loops)
     outline = replace(a.outline, loops=(*a.outline.loops, *loops))
-    return Piece(replace(a.sheet, region=region, **idx), outline)
+    return Piece(united(a.sheet, b.sheet, region), outline)
 
 
 def _moved(xy: np.ndarray, sheet: Sheet, to: Sheet) -> np.ndarray:

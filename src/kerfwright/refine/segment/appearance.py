@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kerfwright.refine.segment._pixels import nearest_centres
+
 __all__ = ["Mixture", "fit_mixture", "same_surface", "with_shade"]
 
 FLOOR_VARIANCE = 2.0  # LAB units squared: sensor noise and JPEG; keeps flat colours from becoming spikes
@@ -92,13 +94,8 @@ def fit_mixture(
 def _nearest(colours: np.ndarray, components: int) -> np.ndarray:
     """k-means, from centres at the quantiles of lightness: repeatable without a random start."""
     order = np.argsort(colours[:, 0], kind="stable")
-    centres = colours[order[((np.arange(components) + 0.5) / components * len(colours)).astype(int)]].copy()
-    labels = np.zeros(len(colours), int)
-    for _ in range(8):
-        labels = ((colours[:, None] - centres) ** 2).sum(2).argmin(1)
-        for k in np.unique(labels):
-            centres[k] = colours[labels == k].mean(0)
-    return labels
+    centres = colours[order[((np.arange(components) + 0.5) / components * len(colours)).astype(int)]].astype(float)
+    return nearest_centres(colours, centres, 8)
 
 
 def _one_hot(labels: np.ndarray) -> np.ndarray:

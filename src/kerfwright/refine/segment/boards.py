@@ -19,6 +19,7 @@ from kerfwright.errors import OptionError
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.types import Sheet
 from kerfwright.parallel import each
+from kerfwright.refine.segment._pixels import add_contrast
 from kerfwright.refine.segment.boundary import Chain, chain_of, loops_of, open_chain, registration, settle, snap
 from kerfwright.refine.segment.constraints import Limit, carve, fill_to_contacts, limits_of, margins
 from kerfwright.refine.segment.drilled import drilled_holes, drilled_seeds
@@ -35,10 +36,10 @@ from kerfwright.refine.segment.evidence import (
     free_pixels,
     gather,
     grown,
-    means_of_others,
     seeds_of,
+    side_sums,
 )
-from kerfwright.refine.segment.graphcut import contrast, cut, smoothness_weights
+from kerfwright.refine.segment.graphcut import STEPS, cut, smoothness_weights
 from kerfwright.refine.segment.grid import Grid, grid_over
 from kerfwright.refine.segment.holes import without_false_holes
 from kerfwright.refine.segment.openings import disagreement, open_seeds, openings
@@ -89,10 +90,10 @@ class _Board:
 
 @dataclass(frozen=True, eq=False)
 class _Looks:
-    """What the photographs show of a board in one round, a list entry a view, all on the board's raster."""
+    """What the photographs show of a board in one round, an entry a view, all on the board's raster."""
 
-    labs: list[np.ndarray]
-    seen: list[np.ndarray]
+    labs: np.ndarray  # (V, rows, cols, 3)
+    seen: np.ndarray  # (V, rows, cols)
     kinds: list[np.ndarray]
     cores: list[np.ndarray]  # seen, and inside for certain
     sides: list[int]
@@ -251,7 +252,7 @@ def _look(
     cores = [seeds.inside & held & (k < OCCLUDED) for (_, held), k in zip(rectified, kinds, strict=True)]
     sides = [v.side for v in board.views]
     labs = even_out([image for image, _ in rectified], cores, sides)
-    seen = [held & (kind != OCCLUDED) for (_, held), kind in zip(rectified, kinds, strict=True)]
+    seen = np.stack([held & (kind != OCCLUDED) for (_, held), kind in zip(rectified, kinds, strict=True)])
     return _Looks(labs, seen, kinds, cores, sides)
 
 
@@ -260,17 +261,18 @@ def _evidence(
 ) -> tuple[list[ViewEvidence], np.ndarray]:
     """Every view's evidence, and the contrast averaged over the views that see a pixel."""
     rng = np.random.default_rng([options.seed, board.idx])
-    means = means_of_others(looks.labs, looks.seen, looks.sides)
-    evidences, total, count, solid = [], 0, 1e-6, board.mask & ~opened
-    for view, lab, mean, shown, kind, core in zip(
-        board.views, looks.labs, means, looks.seen, looks.kinds, looks.cores, strict=True
+    sums = side_sums(looks.labs, looks.seen, looks.sides)
+    shape, solid = board.grid.shape, board.mask & ~opened
+    evidences, total, count = [], np.zeros((len(STEPS), *shape), np.float32), np.full(shape, 1e-6, np.float32)
+    for view, lab, side, shown, kind, core in zip(
+        board.views, looks.labs, looks.sides, looks.seen, looks.kinds, looks.cores, strict=True
     ):
         band = grown(cut_face_band(solid, view, board.grid), error / 2, board.grid.pixel) & ~seeds.inside
-        said = gather(lab, mean, shown, kind, band, seeds, options, rng)
+        said = gather(lab, sums[side], shown, kind, band, seeds, options, rng)
         if said is not None:
             evidences.append(said)
-            total = total + contrast(lab, core) * said.seen
-            count = count + said.seen
+            add_contrast(lab, shown, core, total)
+            count += shown
     return evidences, total / count
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.types import Sheet
+from kerfwright.refine.segment._pixels import add_seen, apart_from_others
 from kerfwright.refine.segment.appearance import Mixture, fit_mixture, same_surface, with_shade
 from kerfwright.refine.segment.grid import Grid
 from kerfwright.refine.segment.options import SegmentOptions
@@ -17,7 +18,7 @@ from kerfwright.refine.segment.views import BoardView
 
 __all__ = [
     "Bounds", "Seeds", "ViewEvidence", "average", "backed_pixels", "behind_cut_faces", "classes_on_grid",
-    "cut_face_band", "free_pixels", "gather", "grown", "means_of_others", "seeds_of", "signed_distance",
+    "cut_face_band", "free_pixels", "gather", "grown", "seeds_of", "side_sums", "signed_distance",
 ]
 
 STRIDE = 3  # rays are cast for every third pixel: outlines of occluders are no better than that
@@ -76,7 +77,12 @@ def signed_distance(mask: np.ndarray, pixel: float) -> np.ndarray:
 
 def grown(mask: np.ndarray, by: float, pixel: float) -> np.ndarray:
     """The mask dilated by `by` mm (eroded when negative)."""
-    return signed_distance(mask, pixel) > -by if mask.any() else mask
+    import cv2
+
+    if not mask.any():
+        return mask
+    distance = cv2.distanceTransform((mask if by < 0 else ~mask).astype(np.uint8), cv2.DIST_L2, 5)
+    return (distance - 0.5) * pixel > -by if by < 0 else (0.5 - distance) * pixel > -by
 
 
 def backed_pixels(
@@ -188,20 +194,22 @@ def cut_face_band(mask: np.ndarray, board_view: BoardView, grid: Grid) -> np.nda
     least = height / (height + thickness)
     rows, columns = mask.shape
     reach = max(np.linalg.norm(eye - c) for c in ((0, 0), (columns, 0), (0, rows), (columns, rows))) * (1 - least)
-    band = np.zeros(mask.shape, np.uint8)
-    for scale in np.linspace(1, least, 2 + int(min(reach, 60) / 2)):
+    doublings = int(np.ceil(np.log2(2 + min(reach, 60) / 2)))
+    band = mask.astype(np.uint8)
+    for k in range(doublings):  # what lies on the way by now, and all of it once more as far again
+        scale = least ** (2**k / (2**doublings - 1))
         turn = np.array([[scale, 0, eye[0] * (1 - scale)], [0, scale, eye[1] * (1 - scale)]])
-        band |= cv2.warpAffine(mask.astype(np.uint8), turn, (columns, rows), flags=cv2.INTER_NEAREST)
+        band |= cv2.warpAffine(band, turn, (columns, rows), flags=cv2.INTER_NEAREST)
     return band.astype(bool) & ~mask
 
 
 def gather(
-    lab: np.ndarray, others: np.ndarray, seen: np.ndarray, kinds: np.ndarray, band: np.ndarray, seeds: Seeds,
-    options: SegmentOptions, rng: np.random.Generator,
+    lab: np.ndarray, sums: tuple[np.ndarray, np.ndarray], seen: np.ndarray, kinds: np.ndarray, band: np.ndarray,
+    seeds: Seeds, options: SegmentOptions, rng: np.random.Generator,
 ) -> ViewEvidence | None:
     """One view's evidence; None when it shows too little of the inside to learn its colours.
 
-    `others` (rows, cols, 3) is the mean of the other views of the same side, NaN where there is none.
+    `sums` are those of its side, as `side_sums` gives them.
     """
     beyond = seen & seeds.beyond & ~band
     inside = _learn(lab, _balanced(seen & seeds.inside, seeds.distance), options, rng)
@@ -210,8 +218,7 @@ def gather(
         return None
     inside = with_shade(inside)
     ask = seen & ~seeds.outside & ~seeds.inside
-    apart = lab - others
-    apart = np.einsum("ijk,ijk->ij", apart, apart)
+    others, apart = apart_from_others(lab, seen, *sums)
     nats, weight = np.zeros(seen.shape, np.float32), np.zeros(seen.shape, np.float32)
     for kind, other in ((CLEAR, BOARD), (BOARD, CLEAR)):
         model = outside[kind] or outside[other]
@@ -266,18 +273,13 @@ def _log_ratio(
     return np.clip(within - outside.log_density(colours), -cap, cap)
 
 
-def means_of_others(labs: Sequence[np.ndarray], seen: Sequence[np.ndarray], sides: Sequence[int]) -> list[np.ndarray]:
-    """For each view the mean of the other views of its side, (rows, cols, 3), NaN where no other sees the pixel."""
-    shown = [np.where(m[..., None], lab, 0) for lab, m in zip(labs, seen, strict=True)]
-    totals = {s: sum(lab for lab, t in zip(shown, sides, strict=True) if t == s) for s in set(sides)}
-    counts = {s: sum(m.astype(np.float32) for m, t in zip(seen, sides, strict=True) if t == s) for s in set(sides)}
-    out = []
-    for lab, mask, side in zip(shown, seen, sides, strict=True):
-        rest = counts[side] - mask
-        mean = (totals[side] - lab) / np.maximum(rest, 1)[..., None]
-        mean[rest <= 0] = np.nan
-        out.append(mean)
-    return out
+def side_sums(labs: np.ndarray, seen: np.ndarray, sides: Sequence[int]) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """For each side its views' colours, summed where they see, (rows, cols, 3), and how many see a pixel, (rows, cols).
+    """
+    sums = {s: (np.zeros(labs.shape[1:], np.float32), np.zeros(seen.shape[1:], np.float32)) for s in sorted(set(sides))}
+    for lab, shown, side in zip(labs, seen, sides, strict=True):
+        add_seen(lab, shown, *sums[side])
+    return sums
 
 
 def _trust(

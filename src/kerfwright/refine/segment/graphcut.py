@@ -4,29 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from kerfwright.refine.segment.constraints import neighbours
+from kerfwright.refine.segment._pixels import ALONG
 
-__all__ = ["STEPS", "contrast", "cut", "smoothness_weights"]
+__all__ = ["STEPS", "cut", "smoothness_weights"]
 
-STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))  # neighbours right, down, and both diagonals: fewer stairs than four
+STEPS = ALONG  # neighbours right, down, and both diagonals: fewer stairs than four
 LENGTH = (1.0, 1.0, 2**-0.5, 2**-0.5)
 SHARE = 0.5  # of an edge's weight each of the 8-neighbourhood's edges carries, so that the sum compares to 4-connected
 HARD = 1e6
-STEEPEST = 8.0  # one view's contrast says no more than this: a glint must not outvote the rest
-
-
-def contrast(lab: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """(4, rows, cols) squared colour steps to each neighbour over those usual inside the board."""
-    stacked = np.zeros((len(STEPS), *lab.shape[:2]), np.float32)
-    for channel in np.ascontiguousarray(np.moveaxis(lab, 2, 0)):
-        for full, (dy, dx) in zip(stacked, STEPS, strict=True):
-            here, there = neighbours(channel, dy, dx)
-            step = here - there
-            step *= step
-            view, _ = neighbours(full, dy, dx)
-            view += step
-    usual = stacked[:, inside].mean() if inside.any() else stacked.mean()
-    return np.minimum(stacked / (4 * max(float(usual), 1.0)), STEEPEST)
 
 
 def smoothness_weights(contrasts: np.ndarray, crossing: np.ndarray, smoothness: float) -> np.ndarray:

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kerfwright.refine.segment._pixels import disagreement_of
 from kerfwright.refine.segment.evidence import Seeds, grown
 from kerfwright.refine.segment.grid import Grid
 
@@ -37,19 +38,7 @@ def disagreement(labs: Sequence[np.ndarray], seen: Sequence[np.ndarray], sides: 
 
     LAB units squared; NaN where fewer than three views of one side see it.
     """
-    total, freedom = np.zeros(seen[0].shape, np.float32), np.zeros(seen[0].shape, np.float32)
-    for side in sorted(set(sides)):
-        own = [(lab, m) for lab, m, s in zip(labs, seen, sides, strict=True) if s == side]
-        if len(own) < LEAST_VIEWS:
-            continue
-        count = sum(m.astype(np.float32) for _, m in own)
-        mean = sum(lab * m[..., None] for lab, m in own) / np.maximum(count, 1)[..., None]
-        apart = np.stack([np.einsum("ijk,ijk->ij", lab - mean, lab - mean) * m for lab, m in own])
-        enough = count >= LEAST_VIEWS
-        rest = apart.sum(0) - apart.max(0) * count / np.maximum(count - 1, 1)
-        total += np.where(enough, np.maximum(rest, 0), 0)
-        freedom += np.where(enough, count - 2, 0)
-    return np.where(freedom > 0, total / np.maximum(freedom, 1), np.nan)
+    return disagreement_of(np.asarray(labs, np.float32), np.asarray(seen), np.asarray(sides), LEAST_VIEWS)
 
 
 def openings(

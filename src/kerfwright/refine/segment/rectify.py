@@ -10,6 +10,7 @@ import numpy as np
 from kerfwright.capture.photos import photograph
 from kerfwright.capture.types import View
 from kerfwright.identify.types import Sheet
+from kerfwright.refine.segment._pixels import channel_medians, rectified
 from kerfwright.refine.segment.grid import Grid
 from kerfwright.refine.segment.views import BoardView
 
@@ -68,37 +69,31 @@ def rectify(
     photos: Photos, sheet: Sheet, board_view: BoardView, grid: Grid, shift: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """A photograph on the raster of its near sheet plane: (rows, cols, 3) uint8 RGB and a mask of what it holds."""
-    pixels = _plane_pixels(sheet, board_view, grid, shift)
     shrink = max(1, int(board_view.density * grid.pixel / FINE))
-    return sample(photos, board_view.view, pixels, shrink)
-
-
-def _plane_pixels(sheet: Sheet, board_view: BoardView, grid: Grid, shift: np.ndarray) -> np.ndarray:
-    """(rows, cols, 2) photo pixels of the raster's pixels on the near sheet plane."""
-    camera = board_view.view.camera
-    camera_from_board = board_view.view.camera_from_world @ sheet.world_from_board
+    view = board_view.view
+    camera_from_board = view.camera_from_world @ sheet.world_from_board
     turn, move = camera_from_board[:3, :3], camera_from_board[:3, 3]
-    constant = turn @ [*shift, board_view.near] + move
-    x, y, z = grid.affine(np.column_stack([turn[:, :2], constant]))
-    xy = np.stack([x, y], -1) / np.where(z > 0, z, np.nan)[..., None]
-    if camera.distortion.any():
-        xy = camera.distort(xy.reshape(-1, 2)).reshape(xy.shape)
-    focal, middle = np.diag(camera.matrix)[:2], camera.matrix[:2, 2]
-    return xy * focal.astype(np.float32) + middle.astype(np.float32)
+    camera_from_plane = np.column_stack([turn[:, :2], turn @ [*shift, board_view.near] + move])
+    return rectified(
+        photos.get(view, shrink), camera_from_plane, view.camera.lens, shrink, grid.origin, grid.pixel, *grid.shape
+    )
 
 
-def even_out(images: Sequence[np.ndarray], masks: Sequence[np.ndarray], sides: Sequence[int]) -> list[np.ndarray]:
-    """LAB images (float32) after each view's channels were scaled to the median of its side's views, inside `masks`."""
-    medians = [np.median(i[m], axis=0) if m.any() else None for i, m in zip(images, masks, strict=True)]
-    evened = []
-    for image, median, side in zip(images, medians, sides, strict=True):
-        peers = [m for m, s in zip(medians, sides, strict=True) if s == side and m is not None]
-        gain = np.ones(3) if median is None else np.median(peers, axis=0) / np.maximum(median, 1)
-        evened.append(_to_lab(image, np.clip(gain, 1 / GAIN, GAIN)))
+def even_out(images: Sequence[np.ndarray], masks: Sequence[np.ndarray], sides: Sequence[int]) -> np.ndarray:
+    """(V, rows, cols, 3) float32 LAB after each view's channels were scaled to the median of its side's views, inside
+    `masks`.
+    """
+    medians = [channel_medians(i, m) for i, m in zip(images, masks, strict=True)]
+    evened = np.empty((len(images), *images[0].shape), np.float32)
+    for k, (image, median, side) in enumerate(zip(images, medians, sides, strict=True)):
+        peers = [m for m, s in zip(medians, sides, strict=True) if s == side and np.isfinite(m).all()]
+        gain = np.median(peers, axis=0) / np.maximum(median, 1) if np.isfinite(median).all() else np.ones(3)
+        evened[k] = _to_lab(image, np.clip(gain, 1 / GAIN, GAIN))
     return evened
 
 
 def _to_lab(image: np.ndarray, gain: np.ndarray) -> np.ndarray:
     import cv2
 
-    return cv2.cvtColor(np.clip(image * (gain / 255).astype(np.float32), 0, 1).astype(np.float32), cv2.COLOR_RGB2LAB)
+    levels = np.clip(np.arange(256)[None, :, None] * (gain / 255), 0, 1).astype(np.float32)
+    return cv2.cvtColor(cv2.LUT(image, levels), cv2.COLOR_RGB2LAB)

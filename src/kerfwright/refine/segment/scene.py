@@ -16,6 +16,7 @@ __all__ = ["BOARD", "CLEAR", "OCCLUDED", "Occluders", "slab_mesh"]
 
 CLEAR, BOARD, OCCLUDED = 0, 1, 2  # what a ray meets behind the plane (ground or nothing; a board), or a board before it
 GROUND_SIDE = 1e5  # mm; the floor reaches further than any photograph shows
+FINE = 0.4  # mm that an occluder's outline may be off: they are known no better, and masks have thousands of corners
 TOUCHING = 1e-3  # relative distance within which a hit counts as on the plane
 
 
@@ -55,7 +56,7 @@ class Occluders:
 
 
 def _placed(sheet: Sheet, piece: Polygon) -> tuple[np.ndarray, np.ndarray]:
-    vertices, triangles = slab_mesh(orient(piece), sheet.thickness.value)
+    vertices, triangles = slab_mesh(orient(piece.simplify(FINE)), sheet.thickness.value)
     return sheet.to_world(vertices), triangles
 
 

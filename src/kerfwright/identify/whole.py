@@ -1,0 +1,41 @@
+"""Boards made whole: what the cloud shows in part goes on to where other boards, or the photographs, say it ends.
+
+Selection knows that a board is there; its region stops where stereo does. Boards in the dark are run on to what they
+end on, hidden faces are put where the board that hides them begins, and boards side by side that stereo joined over the
+gap between them are parted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from kerfwright.capture.types import Cloud
+from kerfwright.identify.align import align_sheets
+from kerfwright.identify.freespace import FreeSpace
+from kerfwright.identify.gaps import filled_out, mended
+from kerfwright.identify.grooves import parted
+from kerfwright.identify.laid import laid_on
+from kerfwright.identify.options import WholeOptions
+from kerfwright.identify.photo_edges import Photos
+from kerfwright.identify.reaching import Scene
+from kerfwright.identify.run_on import run_on
+from kerfwright.identify.types import Sheet
+from kerfwright.identify.visibility import Obstacles
+
+__all__ = ["made_whole"]
+
+
+def made_whole(
+    sheets: Sequence[Sheet], cloud: Cloud, photos: Photos, free: FreeSpace, options: WholeOptions
+) -> tuple[Sheet, ...]:
+    """The boards, as far as they go and as thick as they are.
+
+    Their sheet planes are aligned first: over the length of a board in the dark, half a degree is millimetres.
+    Raises StageError when the alignment does not converge.
+    """
+    aligned, _ = align_sheets(tuple(sheets), cloud, options)
+    whole = mended(laid_on(aligned, cloud, free, options), cloud, free, options)
+    for _ in range(options.passes):
+        obstacles = Obstacles(whole, options.outline_error * cloud.diameter)
+        whole = run_on(Scene(whole, cloud, photos, obstacles, free, options))
+    return parted(filled_out(whole, cloud, free, options), cloud)
