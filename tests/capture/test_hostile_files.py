@@ -230,3 +230,13 @@ def test_no_room_to_unpack_is_not_taken_for_damage(samples, monkeypatch):
     monkeypatch.setattr(laz, "UNPACK", "raise OSError(28, 'No space left on device', 'points')")
     message = told(samples, "a.laz", (samples / "a.laz").read_bytes())
     assert "No space left on device" in message and "free some space in /" in message and "damaged" not in message
+
+
+def test_want_of_memory_is_not_taken_for_damage(samples, monkeypatch):
+    import pye57
+
+    def want(*_, **__):
+        raise MemoryError("Unable to allocate 2.4 GiB")
+
+    monkeypatch.setattr(pye57.E57, "read_scan", want)
+    assert "thin the cloud" in told(samples, "a.e57", (samples / "a.e57").read_bytes())

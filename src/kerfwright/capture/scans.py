@@ -19,6 +19,7 @@ __all__ = ["read_e57", "read_las"]
 
 PACKAGES = {"laspy": "laspy[lazrs]", "pye57": "pye57"}
 LAS_MARK, E57_MARK = b"LASF", b"ASTM-E57"
+DAMAGED = "it is damaged: copy or export it again"
 LEAST_RECORD = 54  # bytes of the head of a variable length record
 BEST_COMPRESSION = 200  # times, of LAZ; points of a real cloud come to a tenth of that
 
@@ -61,7 +62,8 @@ def _guarded(path: Path, mark: bytes, module: str, read: Callable[[ModuleType, P
         raise
     except BaseException as error:  # a panic in lazrs is no Exception
         reason = f"{type(error).__name__} {' '.join(str(error).split())}"
-        raise capture_error(path, "file", reason, "it is damaged: copy or export it again") from error
+        want = "it needs more memory than there is: thin the cloud" if isinstance(error, MemoryError) else DAMAGED
+        raise capture_error(path, "file", reason, want) from error
 
 
 def _check_las_header(path: Path) -> tuple[int, bool]:
