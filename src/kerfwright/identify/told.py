@@ -19,7 +19,7 @@ from kerfwright.identify.options import IdentifyOptions
 from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.primitives import Neighbourhood
 from kerfwright.identify.rims import Rim
-from kerfwright.identify.thickness import ThicknessHypothesis, from_cut_faces, from_photos
+from kerfwright.identify.thickness import ThicknessHypothesis, from_cut_faces, from_photos, sharpened
 
 __all__ = ["Known", "told_by_others"]
 
@@ -85,7 +85,7 @@ def told_by_others(known: list[Known], scene: _Scene) -> list[Known]:
         if twin is not None:
             told[i] = replace(out[i], hypotheses=(twin,), told=True)
         elif not out[i].hypotheses and (seen := _by_cut_faces(out[i], scene)) is not None:
-            told[i] = replace(out[i], hypotheses=(seen,), told=True)
+            told[i] = replace(out[i], hypotheses=(sharpened(seen, faint[i]),), told=True)
     return told
 
 
