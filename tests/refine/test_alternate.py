@@ -38,6 +38,21 @@ def test_without_constraints_boards_keep_the_outlines_that_were_traced(again):
     assert assembly.constraints == ((),)
 
 
+def test_assembly_starts_again_from_what_was_traced(monkeypatch):
+    seen = sheet("board_01", pose((0, 0, 50)), 18.0, box(0, 0, 300, 300))
+    started: list = []
+
+    def assembled(parts, capture, options):
+        started.extend(parts.start)
+        return Assembly(parts.start, (), ((),))
+
+    monkeypatch.setattr(alternate, "assemble", assembled)
+    monkeypatch.setattr(alternate, "kept_apart", lambda assembly, diameter: assembly)
+    capture = SimpleNamespace(cloud=SimpleNamespace(diameter=450.0))
+    alternate.assembled_again([piece(TRACED)], Parts((seen,), (), 0.3, seen=(seen,)), capture, RefineOptions())
+    assert started[0].region.equals(TRACED)
+
+
 def piece(region, z: float = 50.0) -> alternate.Piece:
     """A board whose outline has the corners of its region."""
     ring = np.asarray(region.exterior.coords)[:-1]
