@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from kerfwright.assemble.decided import Decided
     from kerfwright.identify.freespace import FreeSpace
     from kerfwright.identify.photo_edges import Photos
+    from kerfwright.model import Finding
 
 __all__ = ["AssembleOptions", "Assembly", "ConstraintSegment", "Stock", "assemble"]
 
@@ -41,13 +42,13 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     else:
         sheets, edges = remeasured(sheets, capture.cloud, photos, parts.noise), tuple(() for _ in sheets)
     sheets = _with_hidden_faces(sheets, capture.cloud, photos, free, options)
-    sheets, decided, segments = _met(sheets, capture.cloud, photos, free, options)
+    sheets, decided, segments, findings = _met(sheets, capture.cloud, photos, free, options)
     if options.stock.sizes:
         sheets, decided, segments = _snapped(sheets, decided, capture.cloud, free, parts.noise, options)
     laid = laid_contacts(sheets, options.min_contact * diameter)
     contacts = (*(to_contact(d, sheets) for d in decided), *laid)
     edges = still_open(edges, segments)
-    return Assembly(sheets, contacts, tuple(a + b for a, b in zip(segments, edges, strict=True)))
+    return Assembly(sheets, contacts, tuple(a + b for a, b in zip(segments, edges, strict=True)), findings)
 
 
 def _whole(
@@ -99,21 +100,26 @@ def _snapped(
 
 def _met(
     sheets: tuple[Sheet, ...], cloud: Cloud, photos: Photos, free: FreeSpace, options: AssembleOptions
-) -> tuple[tuple[Sheet, ...], list[Decided], tuple[tuple[ConstraintSegment, ...], ...]]:
-    """Contacts and constraint segments, looked for again once boards were run on to what they end on; and the boards.
+) -> tuple[tuple[Sheet, ...], list[Decided], tuple[tuple[ConstraintSegment, ...], ...], tuple[Finding, ...]]:
+    """Contacts and constraint segments, looked for again once boards were run on to what they end on, until no contact
+    changes; and the boards. Findings tell of contacts that had not come to rest after as many passes as there may be.
     """
     from kerfwright.assemble.constraints import constraint_segments
     from kerfwright.assemble.contacts import find_contacts
+    from kerfwright.assemble.settled import unsettled
 
     decided: list[Decided] = []
-    for _ in range(options.passes):
-        decided = find_contacts(sheets, cloud, photos, free, options, decided)
+    changed: tuple[Finding, ...] = ()
+    for number in range(options.most_passes):
+        before, decided = decided, find_contacts(sheets, cloud, photos, free, options, decided)
         segments = constraint_segments(sheets, decided, cloud.diameter, options)
         filled = _run_on(sheets, segments, options.far_reach * cloud.diameter)
         if all(a.region.equals(b.region) for a, b in zip(sheets, filled, strict=True)):
+            return sheets, decided, segments, ()
+        sheets, changed = filled, unsettled(before, decided, sheets)
+        if number and not changed:
             break
-        sheets = filled
-    return sheets, decided, segments
+    return sheets, decided, segments, changed
 
 
 def _run_on(

@@ -21,6 +21,7 @@ class Stock:
 class AssembleOptions(WholeOptions):
     """What assembly may be told; lengths are fractions of the cloud's largest side D."""
 
+    most_passes: int = 5  # contacts are looked for again until none changes, but no more often than this
     rough: bool = True  # outlines are the cloud's: veils are looked for
     thickness_sigmas: float = 3.0
     stock: Stock = Stock()
