@@ -60,6 +60,11 @@ def test_a_soft_shadow_is_not_sudden():
     assert not stands(with_tone(np.clip((U - SEAM) / 44 + 0.5, 0, 1)))
 
 
+def test_a_soft_shadow_is_told_from_a_joint_and_from_nothing():
+    shadow, joint, nothing = (with_tone(s) for s in (np.clip((U - SEAM) / 44 + 0.5, 0, 1), JOINT, 0 * JOINT))
+    assert [measured(c)[0].slopes(0.5 * SEAM) for c in (shadow, joint, nothing)] == [True, False, False]
+
+
 def test_a_band_of_late_wood_does_not_last():
     band = (U >= SEAM) & (U < SEAM + 36)
     assert stands(with_tone(JOINT)) and not stands(with_tone(band.astype(float)))

@@ -45,6 +45,7 @@ class Discontinuity:
     single: np.ndarray  # (V, U, C, F) of every view
 
     sharp: bool = True  # lines, by whose distance a gap is known
+    denied: float = 2.0  # strength on the other face, below which no joint goes through
 
     @property
     def shown(self) -> int:

@@ -27,11 +27,11 @@ __all__ = ["SeamLine", "SeamSearch", "find_seam_lines", "seam_contact", "seam_se
 
 LEAST_STRENGTH = 7.0  # of a board's best seam, against the usual change across lines of its face
 LENT_STRENGTH = 4.0  # of further ones: where two boards were glued, more may have been
-LENT_TONE = 3.2  # ... told by tone: steps within made single boards had 2.9 at most
+LENT_TONE = 1.9  # ... told by tone: steps within made single boards (seeds from 1000) had 1.7 at most
 LEAST_ALONG = 0.5  # share of the change that every third of the line must show
+LINE_ALONG = 0.6  # ... where no geometry expects a line: a year ring all along a made single board had .55
 LEAST_VIEWS = 4
 CERTAIN = 2.0  # times LEAST_STRENGTH; steep grain that passed for a seam in four views had up to 1.13
-DENIED = 2.0  # strength at a seam's place on the other face, below which there is none
 THROUGH = 1 / 150  # of D, between a seam's places on both faces
 LEAST_AGREEMENT = 0.75  # mean share of the change that a single view shows
 EASED = 1 / 40  # of D; eased edges of two boards lie no further apart
@@ -56,6 +56,7 @@ class SeamLine:
     strength: float
     views: int
     gap: float = 0.0  # mm between the two boards, where their eased edges show as two lines
+    along: float = 1.0  # least share of the change that a third of the line shows
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +78,11 @@ class SeamSearch:
         lines = _on_either_face(self, m, [s and discontinuity(s) for s in strips], least or LENT_STRENGTH)
         if least:
             return lines
-        along = [s if s is not None and runs_along_grain(s) else None for s in strips]
-        tones = _on_either_face(self, m, [s and tone_steps(s) for s in along], LENT_TONE)
+        steps = [s and tone_steps(s) for s in strips]
+        along = [s is not None and runs_along_grain(s) for s in strips]
+        tones = _on_either_face(self, m, [t if a else None for t, a in zip(steps, along, strict=True)], LENT_TONE)
+        shaded = [t for t, a in zip(steps, along, strict=True) if t is not None and not a]
+        lines = [s for s in lines if s.along > LINE_ALONG and not any(t.slopes(s.offset) for t in shaded)]
         seams = _merged(lines, tones, self.diameter)
         return seams if any(_is_clear(s) for s in seams) else []
 
@@ -136,7 +140,7 @@ def _is_denied(seam: SeamLine, own: Change, other: Change | None, diameter: floa
         return False
     near = np.abs(other.offsets - seam.offset) < THROUGH * diameter
     told = other.strength[near & np.isfinite(other.strength)]
-    return bool(len(told) and told.max() < DENIED)
+    return bool(len(told) and told.max() < other.denied)
 
 
 def _seams_across(
@@ -188,8 +192,8 @@ def _seam(change: Change, k: int, m: np.ndarray, ring: np.ndarray, diameter: flo
     apart = step * _partner(strength, k, EASED * diameter / step) if change.sharp else 0.0
     at = change.located(k) + apart / 2
     start, end = at * m + np.array([[along.min()], [along.max()]]) * np.array([-m[1], m[0]])
-    views = _showing(change.views(k))
-    return SeamLine(m, at, start, end, float(strength[k]), views, abs(apart) * GAP_SHARE)
+    told, gap = (float(strength[k]), _showing(change.views(k))), abs(apart) * GAP_SHARE
+    return SeamLine(m, at, start, end, *told, gap, change.along(k))
 
 
 def _partner(strength: np.ndarray, k: int, reach: float) -> float:
@@ -269,8 +273,7 @@ def seam_segments(seam: SeamLine, contact: int | None) -> tuple[ConstraintSegmen
 
     contact: number of the contact that they make; None where the boards lie side by side with a gap.
     """
-    tangent = np.array([-seam.m[1], seam.m[0]])
-    low, high = sorted((seam.start, seam.end), key=lambda p: p @ tangent)
+    low, high = sorted((seam.start, seam.end), key=lambda p: p @ [-seam.m[1], seam.m[0]])
     aside = 0.5 * seam.gap * seam.m
     origin, error = ("photo", 0.25 * seam.gap) if contact is None else ("contact", 0.2)
     before = ConstraintSegment(

@@ -43,7 +43,9 @@ CLIP = 2.5  # robust deviations of stretches: a knot does not set the measure
 USUAL = 0.7  # share of the offsets that set the measure; at others may be seams or shadows
 ROUNDS = 8
 CHI2_MEDIAN = 2.366  # of three degrees of freedom
-SCALE = 7 / 29  # to the strengths of `discontinuity`; 30 made single boards (seeds from 1000) had 2.9 at most
+SCALE = 7 / 50  # to the strengths of `discontinuity`; 30 made single boards (seeds from 1000) had 1.7 at most, a wide
+# band of late wood on a bookshelf's side 4.8
+SHADED = 2.0  # strength of a step of light worth asking whether it slopes
 LEAST_EIGHTHS = 7  # that must step to the same side
 
 
@@ -60,6 +62,7 @@ class ToneSteps:
     colours: np.ndarray  # (V, U, C, 3) of every view
 
     sharp: bool = False
+    denied: float = 0.8  # strength on the other face, below which no joint goes through
 
     @property
     def shown(self) -> int:
@@ -75,9 +78,23 @@ class ToneSteps:
         for good, as bands of late wood do not.
         """
         same = sum(self._share(part, k) > 0 for part in np.array_split(self.flats[-1][k], EIGHTHS))
-        shares = [self._share(flat[k], k) for flat in self.flats[:-1]]
-        sudden = all(low < share < high for share, (low, high) in zip(shares, SUDDEN, strict=True))
-        return same >= LEAST_EIGHTHS and sudden and LASTS[0] < self.beyond(k) < LASTS[1]
+        dark_line = any(share > high for share, (_, high) in zip(self._narrow(k), SUDDEN, strict=True))
+        lasts = LASTS[0] < self.beyond(k) < LASTS[1]
+        return same >= LEAST_EIGHTHS and lasts and not dark_line and not self._slopes_at(k)
+
+    def slopes(self, offset: float) -> bool:
+        """Whether there is a step of tone round an offset (mm) that is none: a soft shadow's border."""
+        near = int(np.abs(self.offsets - offset).argmin())
+        low = max(0, near - NEAR)
+        k = low + int(np.nan_to_num(self.strength[low : near + NEAR + 1]).argmax())
+        return bool(self.strength[k] > SHADED) and self._slopes_at(k)
+
+    def _slopes_at(self, k: int) -> bool:
+        return any(share < low for share, (low, _) in zip(self._narrow(k), SUDDEN, strict=True))
+
+    def _narrow(self, k: int) -> list[float]:
+        """Shares of the broadest window's step that the narrower windows show."""
+        return [self._share(flat[k], k) for flat in self.flats[:-1]]
 
     def beyond(self, k: int) -> float:
         """Share of the step at offset k that wood further away shows; 1 where none is seen there."""
