@@ -19,10 +19,11 @@ from kerfwright.model import Quantity
 from kerfwright.pipeline import STAGES, ReconstructOptions, run_stages
 from kerfwright.progress import Reporter
 
-__all__ = ["Rough", "free_space", "match", "rough_boards"]
+__all__ = ["Rough", "free_space", "match", "rough_boards", "seen_on", "side_by_side"]
 
 CLOSE_DEGREES = 10.0  # between sheet normals of boards that may be the same
 LEAST_OVERLAP = 0.3  # of their outlines
+MOSTLY = 0.7  # of a true board, that lies in a rough one of which it is a part
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +81,26 @@ def match(rough: Rough) -> dict[int, int]:
     share = np.array([[_overlap(t, s) for s in rough.assembly.sheets] for t in rough.truth])
     pairs = zip(*linear_sum_assignment(-share), strict=True)
     return {int(i): int(j) for i, j in pairs if share[i, j] > LEAST_OVERLAP}
+
+
+def side_by_side(rough: Rough, pairs: dict[int, int]) -> dict[int, tuple[int, ...]]:
+    """{rough board: true boards} of rough boards that are several true ones side by side, which none else was found as.
+
+    Such boards are parted later, by their seams or by the gaps that the photographs show.
+    """
+    out = {}
+    for j, found in enumerate(rough.assembly.sheets):
+        own = [i for i, k in pairs.items() if k == j]
+        free = [i for i, t in enumerate(rough.truth) if i not in pairs and _held(t, found) > MOSTLY]
+        if len(own) + len(free) > 1:
+            out[j] = (*own, *free)
+    return out
+
+
+def _held(true: Sheet, found: Sheet) -> float:
+    """Share of a true board that lies in a found one; 0 where the planes are not the same."""
+    outline = seen_on(true, found)
+    return float(outline.intersection(found.region).area / outline.area) if _overlap(true, found) > 0 else 0.0
 
 
 def _overlap(true: Sheet, found: Sheet) -> float:

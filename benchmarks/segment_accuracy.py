@@ -25,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 import shapely
-from pipeline_boards import free_space, match, rough_boards
+from pipeline_boards import free_space, match, rough_boards, seen_on, side_by_side
 from shapely.geometry import LineString, MultiPolygon, Polygon
 from shapely.geometry.polygon import orient
 
@@ -41,6 +41,7 @@ from kerfwright.refine.segment.scene import Occluders
 from kerfwright.refine.segment.views import _inner_samples, _look
 
 CAPTURES = Path("/work/shared/captures")
+GLUED = 0.1  # working mm between true boards that are glued edge to edge
 WHOLE = 0.98  # share of samples of a board that a photograph shows whole
 
 
@@ -299,7 +300,14 @@ def from_pipeline(name: str, options) -> Case:
     for i, j in pairs.items():
         t = rough.truth[i]
         boards[j] = TrueBoard(t.name, t.world_from_board, t.thickness.value, t.region)
-    missing = tuple(t.name for i, t in enumerate(rough.truth) if i not in pairs)
+    several = side_by_side(rough, pairs)
+    for j, members in several.items():
+        first = rough.truth[members[0]]
+        outline = shapely.union_all([seen_on(rough.truth[i], first) for i in members]).buffer(GLUED).buffer(-GLUED)
+        label = f"{first.name} +{len(members) - 1}"
+        boards[j] = TrueBoard(label, first.world_from_board, first.thickness.value, outline)
+    inside = {i for members in several.values() for i in members}
+    missing = tuple(t.name for i, t in enumerate(rough.truth) if i not in pairs and i not in inside)
     return Case(name, rough.capture, rough.assembly.sheets, rough.assembly.constraints, boards, missing,
                 free_space(rough), rough.unit)
 
@@ -309,7 +317,7 @@ def shown_whole(case: Case) -> list[bool]:
     true = [b for b in case.boards if b is not None]
     sheets = [Sheet(b.name, b.world_from_board, Quantity(value=b.thickness), True, b.outline, *[np.zeros(0, int)] * 3)
               for b in true]
-    occluders = Occluders(sheets, [[s.region] for s in sheets])
+    occluders = Occluders(sheets, [list(shapely.get_parts(s.region)) for s in sheets])
     whole = {}
     for k, sheet in enumerate(sheets):
         inner = _inner_samples(sheet.region.buffer(-1))
