@@ -43,6 +43,23 @@ def run(folder: Path, stages: dict, basis: str = "b") -> dict:
     return reused
 
 
+def test_results_are_the_same_bytes_whatever_orders_sets(tmp_path):
+    """A stage that is run again in another process and finds the same must not seem to have found something else."""
+    script = (
+        "from pathlib import Path; from kerfwright.cache import StageCache; from kerfwright.model import Scale;"
+        "result = [Scale(millimetres_per_unit=2, origin='given', note='n'), frozenset('abcdef'), set('fedcba'), set()];"
+        "found = StageCache(Path({!r})).get('a', (), lambda: result)[0]"
+    )
+    for seed in "0123":
+        folder = tmp_path / seed
+        command = [sys.executable, "-c", script.format(str(folder))]
+        subprocess.run(command, check=True, env=os.environ | {"PYTHONHASHSEED": seed})
+    assert len({next((tmp_path / seed).iterdir()).read_bytes() for seed in "0123"}) == 1
+    scale, *sets = read_kept(tmp_path / "3", "a")
+    assert scale.model_fields_set == {"millimetres_per_unit", "origin", "note"}
+    assert sets == [set("abcdef"), set("abcdef"), set()] and [type(s) for s in sets] == [frozenset, set, set]
+
+
 def test_a_second_run_runs_nothing(tmp_path):
     stages = {"a": Counter(1), "b": Counter(2)}
     assert run(tmp_path, stages) == {"a": False, "b": False}

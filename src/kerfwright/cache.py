@@ -83,7 +83,7 @@ class StageCache:
 
     def _keep(self, path: Path, result: Any) -> str:
         """Write the result; the hash of its bytes."""
-        data = pickle.dumps(result, protocol=5)
+        data = _pickled(result)
         digest = hashlib.sha256(data)
         beside = path.with_name(f"{path.name}.partial")
         try:
@@ -125,6 +125,34 @@ def _read(path: Path) -> tuple[Any, str] | None:
         raise OutputError(
             f"{path}: cache: {shown(type(error).__name__)}: not what kerfwright keeps there: delete the folder's .cache"
         ) from error
+
+
+def _pickled(result: Any) -> bytes:
+    """The same bytes in every process: sets, whose order depends on Python's seed of hashes, are sorted."""
+    stream = io.BytesIO()
+    _Pickler(stream, protocol=5).dump(result)
+    return stream.getvalue()
+
+
+class _Pickler(pickle._Pickler):
+    dispatch: ClassVar = dict(pickle._Pickler.dispatch)
+
+    def save_set(self, things: set) -> None:
+        self.write(pickle.EMPTY_SET)
+        self.memoize(things)
+        self.write(pickle.MARK)
+        for thing in sorted(things, key=repr):
+            self.save(thing)
+        self.write(pickle.ADDITEMS)
+
+    def save_frozenset(self, things: frozenset) -> None:
+        self.write(pickle.MARK)
+        for thing in sorted(things, key=repr):
+            self.save(thing)
+        self.write(pickle.FROZENSET)
+        self.memoize(things)
+
+    dispatch[set], dispatch[frozenset] = save_set, save_frozenset
 
 
 class _Unpickler(pickle._Unpickler):
