@@ -60,6 +60,16 @@ def test_results_are_the_same_bytes_whatever_orders_sets(tmp_path):
     assert sets == [set("abcdef"), set("abcdef"), set()] and [type(s) for s in sets] == [frozenset, set, set]
 
 
+def test_arrays_without_anything_in_them_are_kept(tmp_path):
+    fixed = np.zeros((0, 2))
+    fixed.flags.writeable = False
+    arrays = [np.zeros(0), np.zeros((0, 3)), fixed, fixed.copy(), np.arange(6.0).reshape(2, 3)[:, ::2], np.arange(3)]
+    StageCache(tmp_path).get("a", (), lambda: arrays)
+    for kept, array in zip(read_kept(tmp_path, "a"), arrays, strict=True):
+        assert kept.shape == array.shape
+        assert (kept == array).all()
+
+
 def test_a_second_run_runs_nothing(tmp_path):
     stages = {"a": Counter(1), "b": Counter(2)}
     assert run(tmp_path, stages) == {"a": False, "b": False}

@@ -152,7 +152,13 @@ class _Pickler(pickle._Pickler):
         self.write(pickle.FROZENSET)
         self.memoize(things)
 
+    def save_picklebuffer(self, buffer: pickle.PickleBuffer) -> None:
+        # Python's own stumbles over the second empty array: their bytes are one object
+        with buffer.raw() as data:
+            self.save(data.tobytes() if data.readonly else bytearray(data))
+
     dispatch[set], dispatch[frozenset] = save_set, save_frozenset
+    dispatch[pickle.PickleBuffer] = save_picklebuffer
 
 
 class _Unpickler(pickle._Unpickler):
