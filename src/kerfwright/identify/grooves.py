@@ -30,6 +30,7 @@ ALONG = 1 / 25  # of D, a stretch along it
 FULL = 0.5  # of the usual number of points on the plane; a cell of a groove has fewer
 SUNK = 0.3  # of the usual number of points that a stretch of a groove has below the plane, at least
 UNBROKEN = 0.9  # share of the stretches that show a groove
+BESIDE, CROSSED = 4, 0.6  # steps to both sides that tell how long a groove is, and the share of it that has points
 DEEP = 1 / 40  # of D; what lies deeper is not the bottom of a groove
 WIDTH = (1 / 150, 1 / 25)  # of D; eased edges of boards that touch make narrower grooves, and wider ones stereo sees
 NARROWEST = 1 / 16  # of D; a narrower strip is no board
@@ -116,11 +117,17 @@ def _across(
         rows = np.flatnonzero(runs == number)
         groove = _Groove(m, low[0] + rows[0] * cell[0], low[0] + (rows[-1] + 1) * cell[0])
         sags = _share(sunk[rows].mean(axis=0, keepdims=True) > SUNK * usual, wood[rows].any(axis=0, keepdims=True))
-        if WIDTH[0] * size < groove.high - groove.low < WIDTH[1] * size and sags[0] > UNBROKEN:
+        if WIDTH[0] * size < groove.high - groove.low < WIDTH[1] * size and sags[0] > UNBROKEN and _crosses(wood, rows):
             found.append(groove)
     edges = [low[0], *(v for g in found for v in (g.low, g.high)), low[0] + shape[0] * cell[0]]
     wide = [b - a > NARROWEST * size for a, b in zip(edges[::2], edges[1::2], strict=True)]
     return [g for g, before, after in zip(found, wide, wide[1:], strict=False) if before and after]
+
+
+def _crosses(wood: np.ndarray, rows: np.ndarray) -> bool:
+    """Whether the rows have points in most stretches of those beside: strays of a sparse cloud are no groove."""
+    beside = wood[max(0, rows[0] - BESIDE) : rows[-1] + BESIDE + 1].any(axis=0)
+    return bool(wood[rows].any(axis=0).sum() > CROSSED * beside.sum())
 
 
 def _share(cells: np.ndarray, wood: np.ndarray) -> np.ndarray:
