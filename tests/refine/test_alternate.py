@@ -43,13 +43,13 @@ def test_assembly_starts_again_from_what_was_traced(monkeypatch):
     started: list = []
 
     def assembled(parts, capture, options):
-        started.extend(parts.start)
-        return Assembly(parts.start, (), ((),))
+        started.extend(parts.sheets)
+        return Assembly(parts.sheets, (), ((),))
 
     monkeypatch.setattr(alternate, "assemble", assembled)
     monkeypatch.setattr(alternate, "kept_apart", lambda assembly, diameter: assembly)
     capture = SimpleNamespace(cloud=SimpleNamespace(diameter=450.0))
-    alternate.assembled_again([piece(TRACED)], Parts((seen,), (), 0.3, seen=(seen,)), capture, RefineOptions())
+    alternate.assembled_again([piece(TRACED)], Parts((seen,), (), 0.3), capture, RefineOptions())
     assert started[0].region.equals(TRACED)
 
 

@@ -34,7 +34,7 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
 
     options = options or AssembleOptions()
     diameter = capture.cloud.diameter
-    sheets, _ = align_sheets(parts.start, capture.cloud, options)
+    sheets, _ = align_sheets(parts.sheets, capture.cloud, options)
     free = see_through(capture, parts.spacing, max(5 * parts.noise, diameter / 150))
     photos = Photos(capture)
     if options.rough:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from kerfwright.capture.types import Capture
 from kerfwright.errors import StageError
-from kerfwright.identify.options import IdentifyOptions
+from kerfwright.identify.options import IdentifyOptions, WholeOptions
 from kerfwright.identify.types import Parts, Primitive, Sheet
 
 if TYPE_CHECKING:
@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from kerfwright.identify.slabs import Slab
 
 __all__ = [
-    "Candidates", "IdentifyOptions", "Parts", "Primitive", "Sheet", "choose", "find_candidates", "identify",
+    "Candidates", "IdentifyOptions", "Parts", "Primitive", "Sheet", "WholeOptions", "choose", "find_candidates",
+    "identify", "whole_boards",
 ]  # fmt: skip
 
 
@@ -76,7 +77,6 @@ def choose(found: Candidates, options: IdentifyOptions) -> Parts:
     """The second half of `identify`: the boards among the candidates; raises StageError when there are none."""
     from kerfwright.identify.dark import with_dark_boards
     from kerfwright.identify.sheets import join_across, to_sheet
-    from kerfwright.identify.whole import made_whole
 
     cloud, around, slabs = found.capture.cloud, found.around, found.slabs
     selection = _selected(cloud, slabs, found.evidence, options)
@@ -86,15 +86,28 @@ def choose(found: Candidates, options: IdentifyOptions) -> Parts:
     boards = with_dark_boards([slabs[k] for k in selection.chosen], found.dark, found.planes, cloud, reach)
     chosen = join_across(boards, reach)
     chosen.sort(key=lambda s: (-round(s.region.area), *s.world_from_board[:3, 3].round(3)))
-    seen = tuple(to_sheet(f"board_{k + 1:02d}", slab, cloud, around, options) for k, slab in enumerate(chosen))
-    sheets = made_whole(seen, cloud, found.photos, found.free, options.whole)
+    sheets = tuple(to_sheet(f"board_{k + 1:02d}", slab, cloud, around, options) for k, slab in enumerate(chosen))
     figures = {
         "candidates": len(slabs), "chosen": len(selection.chosen), "objective": selection.objective,
         "bound": selection.bound, "explained": selection.explained, "method": selection.method,
         "energy": selection.energy,
     }
     notes = _notes(selection.explained, options.least_explained)
-    return Parts(sheets, tuple(found.planes), around.noise, around.spacing, notes, figures, seen)
+    return Parts(sheets, tuple(found.planes), around.noise, around.spacing, notes, figures)
+
+
+def whole_boards(parts: Parts, capture: Capture, options: WholeOptions | None = None) -> tuple[Sheet, ...]:
+    """The boards run on over what nobody saw, and parted where they lie side by side.
+
+    Assembly does not start from these, for it decides how far boards go from all their contacts; they are what
+    identification knows by itself. Raises StageError when their alignment does not converge.
+    """
+    from kerfwright.identify.freespace import see_through
+    from kerfwright.identify.photo_edges import Photos
+    from kerfwright.identify.whole import made_whole
+
+    free = see_through(capture, parts.spacing, max(5 * parts.noise, capture.cloud.diameter / 150))
+    return made_whole(parts.sheets, capture.cloud, Photos(capture), free, options or WholeOptions())
 
 
 def _selected(cloud: Cloud, slabs: list[Slab], evidence: Evidence, options: IdentifyOptions) -> Selection:

@@ -66,7 +66,6 @@ class IdentifyOptions:
     annealing_steps: int = 1000  # paper, Part Selection
     annealing_temperatures: tuple[float, float] = (10.0, 0.1)  # first and last; paper, Part Selection
     seed: int = 0
-    whole: WholeOptions = WholeOptions()
 
     def __post_init__(self):
         for name, known in (("selection", SELECTIONS), ("annealing_energy", ENERGIES)):

@@ -59,9 +59,8 @@ class Sheet:
 class Parts:
     """The selected rough boards, the planes they were found in, and what the selection said.
 
-    `sheets` are whole: run on over what nobody saw, and parted where they lie side by side. `seen` are the same boards
-    as far as the cloud shows them, two that stereo joined still as one: assembly starts from these, for it decides how
-    far they go from all their contacts, and parts them by seams that photographs show more finely than the cloud.
+    `sheets` go as far as the cloud shows them, two that stereo joined still as one; `identify.whole_boards` has them as
+    far as they go.
     """
 
     sheets: tuple[Sheet, ...]
@@ -70,9 +69,3 @@ class Parts:
     spacing: float = 1.0  # median distance to the third nearest point, mm
     notes: tuple[str, ...] = ()
     selection: dict | None = None  # objective, bound, gap, candidates: for the report
-    seen: tuple[Sheet, ...] = ()
-
-    @property
-    def start(self) -> tuple[Sheet, ...]:
-        """The boards that assembly starts from."""
-        return self.seen or self.sheets

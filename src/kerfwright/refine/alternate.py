@@ -119,7 +119,7 @@ def assembled_again(
     pieces: Sequence[Piece], parts: Parts, capture: Capture, options: RefineOptions
 ) -> tuple[tuple[Outline, ...], Assembly]:
     """One outline a board and the assembly found with them."""
-    found = replace(parts, sheets=tuple(p.sheet for p in pieces), seen=())
+    found = replace(parts, sheets=tuple(p.sheet for p in pieces))
     again = assemble(found, capture, replace(EXACT, stock=options.stock))
     again = kept_apart(_with_seams(again, pieces), capture.cloud.diameter)
     if not options.use_constraints:
