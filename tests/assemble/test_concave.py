@@ -51,6 +51,21 @@ def test_inner_corners_are_those_at_which_the_wood_goes_on() -> None:
     assert not len(inner_corners(notched, D))
 
 
+def test_inner_corner_lies_where_the_edges_meet_though_the_outline_cuts_it_off() -> None:
+    cut_off = U.union(Polygon([(90, 290), (90, 280), (100, 290)])).union(Polygon([(270, 290), (270, 280), (260, 290)]))
+    found = np.array(sorted(map(tuple, inner_corners(cut_off, D))))
+    assert found == pytest.approx(np.array([(90, 290), (270, 290)]), abs=0.5)
+
+
+def test_rail_that_one_leg_clearly_ends_is_ended_by_the_other_too(monkeypatch) -> None:
+    seams = find_inner_seams(searched(three_boards))
+    weaker, stronger = sorted(s.strength for s in seams)
+    monkeypatch.setattr(concave, "LEAST_STRENGTH", (weaker + stronger) / 2)
+    assert len(find_inner_seams(searched(three_boards))) == 2
+    monkeypatch.setattr(concave, "LEAST_STRENGTH", stronger + 1)
+    assert not find_inner_seams(searched(three_boards))
+
+
 def test_rail_between_legs_is_cut_off_at_the_inner_corners() -> None:
     search = searched(three_boards)
     assert not find_seam_lines(search)

@@ -10,7 +10,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from shapely.geometry import LineString, Polygon
+from shapely.geometry import LinearRing, LineString, Point, Polygon
 
 from kerfwright.assemble.splits import SeamLine, SeamSearch
 from kerfwright.identify.outlines import largest_piece
@@ -20,12 +20,14 @@ __all__ = ["find_inner_seams", "inner_corners"]
 COARSE = 1 / 60  # of D, to which outlines are simplified: what is left of them has corners
 LEAST_EDGE = 1 / 20  # of D, on both sides of a corner
 LEAST_TURN = 0.5  # sine; grows with the turn up to square corners, and inner corners are that or nearly
+MIDDLE, PLACES = 0.6, 40  # share of an edge that tells its line, and places on it: its ends are the corners' raggedness
 NEAR = 1 / 70  # of D, between an inner corner and its seam
 BESIDE = 1 / 100  # of D, to either side of a seam: there its two ends are looked for
 NARROWEST = 1 / 16  # of D, of the wood along a seam
 SAMPLE = 1 / 5  # of that, between places on the free edge that a seam prolongs
 FEWEST = 20  # of them
-LEAST_STRENGTH = 3.0  # against the usual change across lines of the face
+LEAST_STRENGTH = 3.0  # of a board's best seam, against the usual change across lines of the face
+LENT_STRENGTH = 1.7  # of further ones, in the same ratio as `splits.py` has: a rail that one leg ends, the other does too
 STRAY = 0.1  # of a strip between seams that may lie in further pieces
 
 
@@ -39,17 +41,50 @@ def find_inner_seams(search: SeamSearch) -> list[SeamLine]:
     found = [_seams(search, m, corners) for m in (first, np.array([-first[1], first[0]]))]
     best = max(found, key=lambda seams: max((s.strength for s in seams), default=0.0))
     best = sorted(best, key=lambda s: s.offset)
-    return best if _parts_whole(sheet.region, best) else []
+    clear = any(s.strength > LEAST_STRENGTH for s in best)
+    return best if clear and _parts_whole(sheet.region, best) else []
 
 
 def inner_corners(region: Polygon, diameter: float) -> np.ndarray:
-    """(N, 2) corners of the coarse outline at which the wood fills more than half a turn."""
+    """(N, 2) corners of the coarse outline at which the wood fills more than half a turn, each where the two edges of the
+    outline itself meet: a coarse corner lies up to its tolerance away, further than a seam may.
+    """
     ring = np.asarray(region.simplify(COARSE * diameter).exterior.coords)[:-1, :2]
     before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
     lengths = np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1)
     sine = (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]) / lengths[0] / lengths[1]
     sine = sine if region.exterior.is_ccw else -sine
-    return ring[(sine < -LEAST_TURN) & (np.minimum(*lengths) > LEAST_EDGE * diameter)]
+    found = np.flatnonzero((sine < -LEAST_TURN) & (np.minimum(*lengths) > LEAST_EDGE * diameter))
+    count = len(ring)
+    return np.array([
+        _met(region.exterior, ring[k - 1], ring[k], ring[(k + 1) % count], diameter) for k in found
+    ]).reshape(-1, 2)  # fmt: skip
+
+
+def _met(outline: LinearRing, before: np.ndarray, corner: np.ndarray, after: np.ndarray, diameter: float) -> np.ndarray:
+    """(2,) where the outline's edges on both sides of a coarse corner meet; that corner if this is nowhere near."""
+    lines = [_edge_line(outline, *ends) for ends in ((before, corner), (corner, after))]
+    normals, offsets = np.array([n for n, _ in lines]), np.array([d for _, d in lines])
+    if abs(np.linalg.det(normals)) < LEAST_TURN:
+        return corner
+    met = np.linalg.solve(normals, offsets)
+    return met if np.linalg.norm(met - corner) < 2 * COARSE * diameter else corner
+
+
+def _edge_line(outline: LinearRing, start: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, float]:
+    """Normal (2,) and offset of the line through the middle of the outline from one coarse corner to the next."""
+    along = np.sort([outline.project(Point(start)), outline.project(Point(end))])
+    if along[1] - along[0] > outline.length / 2:  # by way of the ring's first point
+        along = np.array([along[1], along[0] + outline.length])
+    places = np.linspace(*(along[0] + np.ptp(along) * np.array([1 - MIDDLE, 1 + MIDDLE]) / 2), PLACES) % outline.length
+    xy = np.array([outline.interpolate(s).coords[0][:2] for s in places])
+    direction = (end - start) / np.linalg.norm(end - start)
+    normal = np.array([-direction[1], direction[0]])
+    u, v = xy @ direction, xy @ normal
+    one, two = np.triu_indices(PLACES, 1)
+    slope = float(np.median((v[two] - v[one]) / (u[two] - u[one] + 1e-9)))  # Theil and Sen's
+    normal = (normal - slope * direction) / np.hypot(1, slope)
+    return normal, float(np.median(xy @ normal))
 
 
 def _seams(search: SeamSearch, m: np.ndarray, corners: np.ndarray) -> list[SeamLine]:
@@ -62,7 +97,7 @@ def _seams(search: SeamSearch, m: np.ndarray, corners: np.ndarray) -> list[SeamL
         band = _band(search.sheet.region, m, corner, search.diameter)
         if band is not None:
             own = replace(search, sheet=replace(search.sheet, region=band))
-            seams = [s for s in own.across(m, LEAST_STRENGTH) if abs(s.offset - corner @ m) < near]
+            seams = [s for s in own.across(m, LENT_STRENGTH) if abs(s.offset - corner @ m) < near]
             seams = sorted(seams, key=lambda s: -s.strength)[:1]
             found += [_in_line(s, search.sheet.region, band, corner, near) for s in seams]
     return found
