@@ -122,6 +122,14 @@ def test_a_board_is_cut_back_from_one_that_it_does_not_meet():
     assert apart.sheets[0] is FLOOR
 
 
+def test_a_board_is_cut_back_from_a_parallel_one_beside_it_and_not_from_one_laid_on_it():
+    beside = sheet("beside", pose((395, 0, 4)), 10.0, (0, 0, 200, 100))
+    laid = sheet("laid", pose((0, 0, 18)), 10.0, (0, 0, 200, 100))
+    apart = kept_apart(Assembly((FLOOR, beside, laid), (), ((), (), ())), 500)
+    assert apart.sheets[1].region.bounds == pytest.approx((5.25, 0, 200, 100))
+    assert apart.sheets[2] is laid
+
+
 def test_boards_that_meet_are_left_to_their_contact():
     contact = Contact(
         type=1, a="floor", b="foot", face_a="top", face_b="edge", point=(0, 0, 18), normal=(0, 0, 1), interface=(),

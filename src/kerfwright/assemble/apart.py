@@ -9,6 +9,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from kerfwright.assemble.types import Assembly
+from kerfwright.identify.coplanar import PARALLEL, moved_region
 from kerfwright.identify.joints import face_plane, trace_of
 from kerfwright.identify.outlines import largest_piece
 from kerfwright.identify.types import Sheet
@@ -16,6 +17,7 @@ from kerfwright.identify.types import Sheet
 __all__ = ["kept_apart"]
 
 MOST = 0.05  # of a region that is cut off; more is no slip of an outline, and is left for the checker to report
+LEVEL = 0.1  # of the thinner of two parallel boards' thickness, by which they lie side by side and not on one another
 CLEARANCE = 1 / 2000  # of D, between a board and what it was cut off from
 
 
@@ -43,6 +45,8 @@ def _cut_back(sheet: Sheet, other: Sheet, clearance: float) -> Sheet:
 
 def _shadow(sheet: Sheet, other: Sheet, clearance: float) -> Polygon:
     """Where the other board lies in the sheet: between its planes, at any height, and within its outline."""
+    if abs(sheet.normal @ other.normal) > PARALLEL:
+        return _beside(sheet, other, clearance)
     span = 4 * (sheet.region.length + other.region.length)
     strip = None
     for face in ("top", "bottom"):
@@ -57,6 +61,16 @@ def _shadow(sheet: Sheet, other: Sheet, clearance: float) -> Polygon:
         ])
         strip = half if strip is None else strip.intersection(half)
     return strip.intersection(_outline_in(sheet, other, clearance))
+
+
+def _beside(sheet: Sheet, other: Sheet, clearance: float) -> Polygon:
+    """The outline of a parallel board at the same height as the sheet; of one laid on it nothing."""
+    place = other.region.representative_point().coords[0]
+    faces = other.to_world(np.array([[*place, z] for z in (0.0, other.thickness.value)]))
+    low, high = np.sort(sheet.to_board(faces)[:, 2])
+    thinner = min(sheet.thickness.value, other.thickness.value)
+    level = min(high, sheet.thickness.value) - max(low, 0.0) > LEVEL * thinner
+    return moved_region(other, sheet).buffer(clearance) if level else Polygon()
 
 
 def _outline_in(sheet: Sheet, other: Sheet, clearance: float) -> Polygon:

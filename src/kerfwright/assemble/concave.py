@@ -27,7 +27,7 @@ NARROWEST = 1 / 16  # of D, of the wood along a seam
 SAMPLE = 1 / 5  # of that, between places on the free edge that a seam prolongs
 FEWEST = 20  # of them
 LEAST_STRENGTH = 3.0  # of a board's best seam, against the usual change across lines of the face
-LENT_STRENGTH = 1.7  # of further ones, in the same ratio as `splits.py` has: a rail that one leg ends, the other does too
+LENT_STRENGTH = 1.7  # of further ones, in the ratio of `splits.py`: a rail that one leg ends, the other ends, too
 STRAY = 0.1  # of a strip between seams that may lie in further pieces
 
 
@@ -46,8 +46,8 @@ def find_inner_seams(search: SeamSearch) -> list[SeamLine]:
 
 
 def inner_corners(region: Polygon, diameter: float) -> np.ndarray:
-    """(N, 2) corners of the coarse outline at which the wood fills more than half a turn, each where the two edges of the
-    outline itself meet: a coarse corner lies up to its tolerance away, further than a seam may.
+    """(N, 2) corners of the coarse outline at which the wood fills more than half a turn, each where the two edges of
+    the outline itself meet: a coarse corner lies up to its tolerance away, further than a seam may.
     """
     ring = np.asarray(region.simplify(COARSE * diameter).exterior.coords)[:-1, :2]
     before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring

@@ -10,7 +10,7 @@ from shapely.geometry import Polygon
 
 from kerfwright.identify.types import Sheet
 
-__all__ = ["in_one_plane", "moved_region", "united", "with_own_points"]
+__all__ = ["PARALLEL", "in_one_plane", "moved_region", "united", "with_own_points"]
 
 PARALLEL = 1 - 1e-6  # cosine between pieces of one board, once aligned
 

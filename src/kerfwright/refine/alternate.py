@@ -10,6 +10,7 @@ from shapely import union_all
 from shapely.geometry import Polygon
 
 from kerfwright.assemble import AssembleOptions, assemble
+from kerfwright.assemble.abutting import with_abutting
 from kerfwright.assemble.apart import kept_apart
 from kerfwright.assemble.concave import find_inner_seams, inner_corners
 from kerfwright.assemble.rings import find_ring_seams, split_ring
@@ -121,7 +122,8 @@ def assembled_again(
     """One outline a board and the assembly found with them."""
     found = replace(parts, sheets=tuple(p.sheet for p in pieces))
     again = assemble(found, capture, replace(EXACT, stock=options.stock))
-    again = kept_apart(_with_seams(again, pieces), capture.cloud.diameter)
+    again = with_abutting(_with_seams(again, pieces), capture.cloud.diameter)
+    again = kept_apart(again, capture.cloud.diameter)
     if not options.use_constraints:
         again = _unconstrained(_with_regions(again, [p.sheet.region for p in pieces]))
     return tuple(p.outline for p in pieces), again
