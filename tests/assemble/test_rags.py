@@ -1,5 +1,6 @@
 """Pieces of one board that the cloud shows apart are joined, and only those."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -59,6 +60,12 @@ def test_rags_of_a_dark_shelf_are_one_board():
 ])  # fmt: skip
 def test_boards_apart_stay_apart(apart):
     assert len(joined(*shelf(**apart))) == 3
+
+
+def test_a_board_of_which_both_faces_are_seen_badly_is_seen_badly():
+    (one, two, top), cloud = shelf(step=6.0)
+    both = [replace(s, bottom_idx=s.top_idx) for s in (one, two)]  # each face shows too little for a gap to be real
+    assert len(joined((*both, top), cloud)) == 2
 
 
 def test_a_gap_that_was_seen_through_stays():

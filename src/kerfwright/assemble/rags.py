@@ -111,7 +111,7 @@ def _is_rag(
     cut = a.to_board(points[np.concatenate([a.cut_idx, b.cut_idx])])[:, :2]
     if _is_lined(gap, shapely.union_all([a.region, other]), cut, scene.near):
         return False
-    faces = [a.to_board(points[np.concatenate([s.top_idx, s.bottom_idx])])[:, :2] for s in (a, b)]
+    faces = [a.to_board(points[max(s.top_idx, s.bottom_idx, key=len)])[:, :2] for s in (a, b)]  # `dense` is one face's
     thin = all(is_thin(gap, r, f, scene.near, scene.dense) for r, f in zip((a.region, other), faces, strict=True))
     if not thin and not _is_stood_on(gap, a, rest, scene):
         return False

@@ -76,6 +76,7 @@ def find_candidates(capture: Capture, options: IdentifyOptions) -> Candidates:
 def choose(found: Candidates, options: IdentifyOptions) -> Parts:
     """The second half of `identify`: the boards among the candidates; raises StageError when there are none."""
     from kerfwright.identify.dark import with_dark_boards
+    from kerfwright.identify.dark_ends import run_to_ends
     from kerfwright.identify.sheets import join_across, to_sheet
 
     cloud, around, slabs = found.capture.cloud, found.around, found.slabs
@@ -84,6 +85,7 @@ def choose(found: Candidates, options: IdentifyOptions) -> Parts:
         raise StageError("cloud: no set of boards explains it: check that the cloud shows one wooden object, cropped")
     reach = max(4 * around.spacing, cloud.diameter / 60)
     boards = with_dark_boards([slabs[k] for k in selection.chosen], found.dark, found.planes, cloud, reach)
+    boards = run_to_ends(boards, found.planes, cloud, around, found.free, options)
     chosen = join_across(boards, reach)
     chosen.sort(key=lambda s: (-round(s.region.area), *s.world_from_board[:3, 3].round(3)))
     sheets = tuple(to_sheet(f"board_{k + 1:02d}", slab, cloud, around, options) for k, slab in enumerate(chosen))

@@ -2,7 +2,8 @@
 
 Their faces have a hundredth of the points of others, too few for a region or to be worth a board's cost. But two small
 plane patches that face away from each other, one over the other, at a board's thickness, which no other board explains,
-are the two faces of one. How far it goes, assembly finds in the photographs.
+are the two faces of one; so is a broad patch over a few points that face the other way, all at one depth. How far it
+goes, its own ends tell (`dark_ends.py`), and assembly finds in the photographs.
 """
 
 from __future__ import annotations
@@ -28,16 +29,20 @@ SAME = 0.3  # of the smaller face's hull, that the larger one's must cover
 ELSEWHERE = 0.25  # of the faces' points at most that lie on boards already found
 CLEAR = 0.25  # of the interior at most that lies in them
 PARALLEL = np.cos(np.radians(4.0))  # between rags of one board
+THICK = 1 / 20  # of D; what lies deeper below a single patch is another board's
 LEVEL = 1 / 250  # of D, between their middles, and between their thicknesses
 NEAR = 1 / 6  # of D, between their outlines
 SITES = 400  # of the interior
+STRAYS, STRAY_SPREAD = 20, 4.0  # points of a far face at least, and their quartiles' distance in the cloud's noise
 HULL = 500  # points of a patch, every n-th, that tell where it lies
 
 
 def dark_slabs(
     capture: Capture, around: Neighbourhood, planes: Sequence[Primitive], free: FreeSpace, options: IdentifyOptions
 ) -> list[Slab]:
-    """Slabs between two small patches that face away from each other, those with most points first."""
+    """Slabs between two small patches that face away from each other, those with most points first; then those below
+    single patches.
+    """
     cloud, size = capture.cloud, capture.cloud.diameter
     limits = options.min_thickness * size, options.max_thickness * size
     enough = options.dark_density / around.spacing**2
@@ -54,7 +59,47 @@ def dark_slabs(
                                options.free_sites)
             if share <= options.max_free:
                 found.append((points, slab))
-    return [slab for _, slab in sorted(found, key=lambda entry: -entry[0])]
+    single = _single_faces(capture.cloud, around, planes, free, options)
+    return [slab for _, slab in (*sorted(found, key=lambda e: -e[0]), *sorted(single, key=lambda e: -e[0]))]
+
+
+def _single_faces(
+    cloud: Cloud, around: Neighbourhood, planes: Sequence[Primitive], free: FreeSpace, options: IdentifyOptions
+) -> list[tuple[int, Slab]]:
+    """Slabs below broad patches with few points, and how many these are."""
+    found, side = [], options.min_unseen_side * cloud.diameter
+    enough = options.dark_density / around.spacing**2
+    for k, plane in enumerate(planes):
+        frame = plane_frame(plane.normal, plane.centroid)
+        xy = ((cloud.points[plane.point_idx[:: max(1, len(plane.point_idx) // HULL)]] - frame[:3, 3]) @ frame[:3, :3])
+        hull = shapely.MultiPoint(xy[:, :2]).convex_hull
+        if hull.buffer(-side / 2).is_empty or len(plane.point_idx) > enough * hull.area:
+            continue
+        thickness = _depth_below(frame, hull, cloud, around, options)
+        if thickness is None:
+            continue
+        board = frame.copy()
+        board[:3, 3] -= thickness.value * frame[:3, 2]
+        share = free_share(board, thickness.value, hull, free, 2 * around.spacing, options.free_sites)
+        slab = Slab(board, thickness, hull, (k,), (), share)
+        if share <= options.max_free and slab.cut_ratio < options.cut_area_ratio:
+            found.append((len(plane.point_idx), slab))
+    return found
+
+
+def _depth_below(
+    frame: np.ndarray, hull: shapely.Polygon, cloud: Cloud, around: Neighbourhood, options: IdentifyOptions
+) -> ThicknessHypothesis | None:
+    """Where points below a patch face away from it, all at one depth."""
+    low, high = options.min_thickness * cloud.diameter, THICK * cloud.diameter
+    height = cloud.points @ frame[:3, 2] - frame[:3, 3] @ frame[:3, 2]
+    below = np.flatnonzero((height < -low) & (height > -high) & (around.normals @ frame[:3, 2] < -PARALLEL))
+    xy = (cloud.points[below] - frame[:3, 3]) @ frame[:3, :2]
+    depth = -height[below[shapely.contains_xy(hull, xy[:, 0], xy[:, 1])]]
+    if len(depth) < STRAYS or np.subtract(*np.percentile(depth, [75, 25])) > STRAY_SPREAD * around.noise:
+        return None
+    error = float(np.std(depth) / np.sqrt(len(depth)) + around.noise)
+    return ThicknessHypothesis(float(np.median(depth)), error, "opposite", float(len(depth)))
 
 
 def _slab(
