@@ -48,13 +48,12 @@ def measured(capture: Capture) -> dict[str, Any]:
     for module, name, phase in (
         (primitives, "look_around", "neighbours"), (primitives, "find_planes", "planes"),
         (slabs, "candidate_slabs", "candidates"), (selection, "gather_evidence", "evidence"),
-        (stage, "choose", "selection"), (whole, "made_whole", "whole"),
+        (stage, "choose", "selection"), (whole, "whole_boards", "whole"),
     ):  # fmt: skip
         setattr(module, name, timed(getattr(module, name), seconds, phase))
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start, spent = time.monotonic(), time.process_time()
     parts = stage.identify(capture, IdentifyOptions())
-    stage.whole_boards(parts, capture)
     return {
         "points": len(capture.cloud), "seconds": seconds, "cpu": time.process_time() - spent,
         "wall": time.monotonic() - start, "before_gib": before / 2**20,

@@ -33,15 +33,14 @@ def measured(path: Path) -> Figures:
     """Everything about one capture; to be run in a process of its own, for its peak memory."""
     from kerfwright.evaluate import read_truth
     from kerfwright.evaluate.score import boards_in_cloud
-    from kerfwright.identify import IdentifyOptions, choose, find_candidates, whole_boards
+    from kerfwright.identify import IdentifyOptions, choose, find_candidates, made_whole
     from kerfwright.pipeline import STAGES, ReconstructOptions
 
     capture = STAGES[0].run(path, ReconstructOptions())
     options = IdentifyOptions()
     start, spent = time.monotonic(), time.process_time()
     candidates = find_candidates(capture, options)
-    parts = choose(candidates, options)
-    parts = replace(parts, sheets=whole_boards(parts, capture))
+    parts = made_whole(choose(candidates, options), candidates)
     took, spent = time.monotonic() - start, time.process_time() - spent
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     truth = read_truth(path / "truth")
@@ -51,9 +50,7 @@ def measured(path: Path) -> Figures:
     out["exact"] = figures(parts, capture, truth)
     for energy in ("total", "mean"):
         walks = [replace(options, selection="annealing", annealing_energy=energy, seed=s) for s in range(SEEDS)]
-        chosen = [choose(candidates, walk) for walk in walks]
-        whole = [replace(parts, sheets=whole_boards(parts, capture)) for parts in chosen]
-        out[energy] = [figures(parts, capture, truth) for parts in whole]
+        out[energy] = [figures(made_whole(choose(candidates, walk), candidates), capture, truth) for walk in walks]
     return out
 
 

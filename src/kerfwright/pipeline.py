@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from kerfwright.assemble import Stock
     from kerfwright.assemble.types import Assembly
     from kerfwright.capture.types import Capture
-    from kerfwright.identify.types import Parts
+    from kerfwright.identify.types import Parts, Planes
     from kerfwright.model import Finding, Model
     from kerfwright.refine import Refined
 
@@ -198,6 +198,13 @@ def _seen(capture: Capture, options: ReconstructOptions) -> Capture:
     return capture if options.stock else unscaled(capture)
 
 
+def _seen_cloud(capture: Capture, options: ReconstructOptions) -> Capture:
+    """Without the photographs, so that another one leaves what comes from the cloud alone."""
+    from dataclasses import replace
+
+    return replace(_seen(capture, options), views=())
+
+
 def _capture(path: Path, options: ReconstructOptions) -> Capture:
     from kerfwright.capture import PrepareOptions, crop_options, open_capture, prepare
     from kerfwright.capture.photos import lightened
@@ -231,10 +238,16 @@ def _in_working_units(capture: Capture) -> Capture:
     return snapped(working, WORKING_SIZE)
 
 
-def _identify(capture: Capture, options: ReconstructOptions) -> Parts:
+def _planes(capture: Capture, options: ReconstructOptions) -> Planes:
+    from kerfwright.identify import planes_of
+
+    return planes_of(capture.cloud)
+
+
+def _identify(planes: Planes, capture: Capture, options: ReconstructOptions) -> Parts:
     from kerfwright.identify import IdentifyOptions, identify
 
-    return identify(capture, IdentifyOptions(seed=options.seed))
+    return identify(capture, IdentifyOptions(seed=options.seed), planes)
 
 
 def _assemble(parts: Parts, capture: Capture, options: ReconstructOptions) -> Assembly:
@@ -298,7 +311,8 @@ def _check(refined: Refined, parts: Parts, capture: Capture, options: Reconstruc
 STAGES: tuple[Stage, ...] = (
     Stage("capture", "Reading the capture", ("path",), _capture, 0.02,
           _told("up", "millimetres_per_unit", "crop", "ground", "markers")),
-    Stage("identify", "Finding boards in the cloud", ("capture",), _identify, 0.3, _told("seed"), _seen),
+    Stage("planes", "Finding planes in the cloud", ("capture",), _planes, 0.05, _told(), _seen_cloud),
+    Stage("identify", "Finding the boards", ("planes", "capture"), _identify, 0.25, _told("seed"), _seen),
     Stage("assemble", "Finding how the boards meet", ("identify", "capture"), _assemble, 0.1, _told(), _seen),
     Stage("refine", "Tracing cut paths in the photographs", ("assemble", "identify", "capture"), _refine, 0.35,
           _told_refine, _seen),

@@ -7,10 +7,11 @@ import pytest
 from shapely.geometry import Polygon, box
 
 from clouds import box_cloud, cloud_only, pose, sheet, shelf_capture, shelf_parts
-from kerfwright.assemble import AssembleOptions, assemble
+from kerfwright.assemble import AssembleOptions, assemble, contacts
 from kerfwright.assemble.contacts import find_contacts, to_contact
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.photo_edges import Photos
+from kerfwright.identify.seams import Seam
 
 SHELF = sheet("shelf", pose((0, 0, 200)), 18.0, (-150, 0, 150, 100))
 
@@ -66,10 +67,17 @@ def test_constraints_end_the_uprights_at_shelf_and_floor(shelf):
         assert [s.origin for s in segments] == ([] if role(sheet_) == "top" else ["contact", "ground"])
 
 
-def decided_without_photos(*sheets):
+def decided_without_photos(*sheets, ends=()):
     cloud = box_cloud(((-150, 0, 0), (150, 100, 218)), spacing=20.0)
     capture = cloud_only(cloud)
-    return find_contacts(sheets, cloud, Photos(capture), FreeSpace((), (), 1.0, 1.0), AssembleOptions())
+    return find_contacts(sheets, cloud, Photos(capture), FreeSpace((), (), 1.0, 1.0), AssembleOptions(), (), ends)
+
+
+@pytest.mark.parametrize("ends", [(), (("shelf", "side"),)])
+def test_a_board_that_identification_ran_on_is_not_asked_for_a_seam(monkeypatch, ends):
+    """What was dark before it was run on shows no edge."""
+    monkeypatch.setattr(contacts, "look_for_seam", lambda *_: Seam(1.0, 9))
+    assert len(decided_without_photos(SHELF, upright("side", 40, 200), ends=ends)) == len(ends)
 
 
 def test_geometry_alone_decides_a_tee():

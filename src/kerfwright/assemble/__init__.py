@@ -20,9 +20,10 @@ __all__ = ["AssembleOptions", "Assembly", "ConstraintSegment", "Stock", "assembl
 
 
 def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = None) -> Assembly:
-    """Align the boards, find their contacts and derive constraint segments.
+    """Find the boards' contacts and derive constraint segments.
 
-    Raises StageError when the alignment does not converge.
+    Boards that were traced in photographs are aligned first, as identification has aligned rough ones; raises
+    StageError when that does not converge.
     """
     from kerfwright.assemble.contacts import to_contact
     from kerfwright.assemble.depths import remeasured
@@ -34,15 +35,15 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
 
     options = options or AssembleOptions()
     diameter = capture.cloud.diameter
-    sheets, _ = align_sheets(parts.sheets, capture.cloud, options)
     free = see_through(capture, parts.spacing, max(5 * parts.noise, diameter / 150))
     photos = Photos(capture)
     if options.rough:
-        sheets, edges = _whole(sheets, capture.cloud, photos, free, options)
+        sheets, edges = _whole(parts.sheets, capture.cloud, photos, free, options)
     else:
+        sheets, _ = align_sheets(parts.sheets, capture.cloud, options)
         sheets, edges = remeasured(sheets, capture.cloud, photos, parts.noise), tuple(() for _ in sheets)
     sheets = _with_hidden_faces(sheets, capture.cloud, photos, free, options)
-    sheets, decided, segments, findings = _met(sheets, capture.cloud, photos, free, options)
+    sheets, decided, segments, findings = _met(sheets, parts.ends, capture.cloud, photos, free, options)
     if options.stock.sizes:
         sheets, decided, segments = _snapped(sheets, decided, capture.cloud, free, parts.noise, options)
     laid = laid_contacts(sheets, options.min_contact * diameter)
@@ -99,7 +100,8 @@ def _snapped(
 
 
 def _met(
-    sheets: tuple[Sheet, ...], cloud: Cloud, photos: Photos, free: FreeSpace, options: AssembleOptions
+    sheets: tuple[Sheet, ...], ends: tuple[tuple[str, str], ...], cloud: Cloud, photos: Photos, free: FreeSpace,
+    options: AssembleOptions,
 ) -> tuple[tuple[Sheet, ...], list[Decided], tuple[tuple[ConstraintSegment, ...], ...], tuple[Finding, ...]]:
     """Contacts and constraint segments, looked for again once boards were run on to what they end on, until no contact
     changes; and the boards. Findings tell of contacts that had not come to rest after as many passes as there may be.
@@ -111,7 +113,7 @@ def _met(
     decided: list[Decided] = []
     changed: tuple[Finding, ...] = ()
     for number in range(options.most_passes):
-        before, decided = decided, find_contacts(sheets, cloud, photos, free, options, decided)
+        before, decided = decided, find_contacts(sheets, cloud, photos, free, options, decided, ends)
         segments = constraint_segments(sheets, decided, cloud.diameter, options)
         filled = _run_on(sheets, segments, options.far_reach * cloud.diameter)
         if all(a.region.equals(b.region) for a, b in zip(sheets, filled, strict=True)):

@@ -36,16 +36,20 @@ MITRE_VIEWS = 6  # an end face is small: fewer photographs of it say nothing
 
 def find_contacts(
     sheets: tuple[Sheet, ...], cloud: Cloud, photos: Photos, free: FreeSpace, options: AssembleOptions,
-    earlier: Sequence[Decided] = (),
+    earlier: Sequence[Decided] = (), ends: Sequence[tuple[str, str]] = (),
 ) -> list[Decided]:
     """Every pair of boards that meets cut on sheet, with corners decided.
 
     earlier : what was found before the regions were run on; its corners stay as they are, for they were decided when
         less was known that could hide their seams, and a board that was run on to another still ends there.
+    ends : of boards that identification ran on to others, by name: (a, b) for b to a.
     """
+    place = {sheet.name: k for k, sheet in enumerate(sheets)}
+    known = {(d.joint.a, d.joint.b) for d in earlier if d.kind == 1}
+    known |= {(place[a], place[b]) for a, b in ends if a in place and b in place}
     settled = {frozenset((d.joint.a, d.joint.b)): d for d in earlier if d.kind in (2, 4)}
     scene = Scene(sheets, cloud, photos, Obstacles(sheets, options.outline_error * cloud.diameter), free, options)
-    near, far, doubtful = _all_joints(scene, {(d.joint.a, d.joint.b) for d in earlier if d.kind == 1})
+    near, far, doubtful = _all_joints(scene, known)
     found: list[Decided] = []
     for a in range(len(sheets)):
         for b in range(a + 1, len(sheets)):

@@ -34,7 +34,7 @@ def content_hash(capture: Capture) -> str:
     return hashlib.sha256(f"{_seen_hash(capture.views, capture.cloud)} {rest}".encode()).hexdigest()
 
 
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=2)  # with the photographs and without
 def _seen_hash(views: tuple[View, ...], cloud: Cloud) -> str:
     total = hashlib.sha256()
     for view in views:

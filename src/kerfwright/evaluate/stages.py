@@ -11,7 +11,6 @@ import shapely
 
 from kerfwright.cache import read_kept
 from kerfwright.errors import OptionError, OutputError
-from kerfwright.identify import whole_boards
 from kerfwright.model import Board, CutPath, Line, Loop, Model
 from kerfwright.model.frames import rows
 from kerfwright.model.io import read_model
@@ -42,8 +41,7 @@ def stage_model(folder: Path, stage: str | None) -> Model:
     if stage not in STAGES:
         raise OptionError(f"stage: {stage}: not known: take one of {', '.join(STAGES)}")
     result, capture = (_kept(folder, name) for name in (stage, "capture"))
-    sheets = whole_boards(result, capture) if stage == "identify" else result.sheets
-    return rough_model(folder.name, sheets, capture, getattr(result, "contacts", ()))
+    return rough_model(folder.name, result.sheets, capture, getattr(result, "contacts", ()))
 
 
 def rough_model(name: str, sheets: Sequence[Sheet], capture: Capture, contacts: Sequence[Contact] = ()) -> Model:

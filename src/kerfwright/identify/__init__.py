@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from kerfwright.capture.types import Capture
 from kerfwright.errors import StageError
 from kerfwright.identify.options import IdentifyOptions, WholeOptions
-from kerfwright.identify.types import Parts, Primitive, Sheet
+from kerfwright.identify.types import Neighbourhood, Parts, Planes, Primitive, Sheet
 
 if TYPE_CHECKING:
     from kerfwright.capture.types import Cloud
     from kerfwright.identify.freespace import FreeSpace
     from kerfwright.identify.photo_edges import Photos
-    from kerfwright.identify.primitives import Neighbourhood
     from kerfwright.identify.selection import Evidence, Selection
     from kerfwright.identify.slabs import Slab
 
 __all__ = [
-    "Candidates", "IdentifyOptions", "Parts", "Primitive", "Sheet", "WholeOptions", "choose", "find_candidates",
-    "identify", "whole_boards",
+    "Candidates", "IdentifyOptions", "Parts", "Planes", "Primitive", "Sheet", "WholeOptions", "choose",
+    "find_candidates", "identify", "made_whole", "planes_of",
 ]  # fmt: skip
 
 
@@ -40,41 +39,55 @@ class Candidates:
     evidence: Evidence
 
 
-def identify(capture: Capture, options: IdentifyOptions | None = None) -> Parts:
+def identify(capture: Capture, options: IdentifyOptions | None = None, planes: Planes | None = None) -> Parts:
     """Find the boards of a capture that `kerfwright.capture.prepare` has moved to the world frame.
 
-    Raises StageError when the cloud shows no plane, or no plane that could be a board.
+    Parameters
+    ----------
+    planes : of the capture's cloud, where they were found before; see `planes_of`.
+
+    Raises StageError when the cloud shows no plane, or no plane that could be a board, or when the alignment of the
+    boards does not converge.
     """
     options = options or IdentifyOptions()
-    return choose(find_candidates(capture, options), options)
+    found = find_candidates(capture, options, planes)
+    return made_whole(choose(found, options), found)
 
 
-def find_candidates(capture: Capture, options: IdentifyOptions) -> Candidates:
-    """The first half of `identify`; raises as it does."""
+def planes_of(cloud: Cloud, options: IdentifyOptions | None = None) -> Planes:
+    """The plane patches of a cloud; raises StageError when there is none."""
+    from kerfwright.identify.primitives import find_planes, look_around
+
+    options = options or IdentifyOptions()
+    around = look_around(cloud, options)
+    return Planes(around, tuple(find_planes(cloud, around, options)))
+
+
+def find_candidates(capture: Capture, options: IdentifyOptions, planes: Planes | None = None) -> Candidates:
+    """What could be boards; raises as `identify` does."""
     from kerfwright.identify.dark import dark_slabs
     from kerfwright.identify.freespace import see_through
     from kerfwright.identify.photo_edges import Photos
-    from kerfwright.identify.primitives import find_planes, look_around
     from kerfwright.identify.selection import gather_evidence
     from kerfwright.identify.slabs import candidate_slabs
 
     cloud = capture.cloud
-    around = look_around(cloud, options)
-    planes = find_planes(cloud, around, options)
+    planes = planes or planes_of(cloud, options)
+    around, patches = planes.around, list(planes.patches)
     free = see_through(capture, around.spacing, max(5 * around.noise, cloud.diameter / 150))
     photos = Photos(capture)
-    slabs = candidate_slabs(capture, around, planes, free, photos, options)
+    slabs = candidate_slabs(capture, around, patches, free, photos, options)
     if not slabs:
         raise StageError(
             "cloud: no plane has a thickness that a board could have: photograph the edges of the boards too"
         )
-    dark = dark_slabs(capture, around, planes, free, options)
+    dark = dark_slabs(capture, around, patches, free, options)
     evidence = gather_evidence(cloud, around, slabs, options)
-    return Candidates(capture, around, free, photos, planes, slabs, dark, evidence)
+    return Candidates(capture, around, free, photos, patches, slabs, dark, evidence)
 
 
 def choose(found: Candidates, options: IdentifyOptions) -> Parts:
-    """The second half of `identify`: the boards among the candidates; raises StageError when there are none."""
+    """The boards among the candidates, as far as the cloud shows them; raises StageError when there are none."""
     from kerfwright.identify.dark import with_dark_boards
     from kerfwright.identify.dark_ends import run_to_ends
     from kerfwright.identify.sheets import join_across, to_sheet
@@ -98,18 +111,16 @@ def choose(found: Candidates, options: IdentifyOptions) -> Parts:
     return Parts(sheets, tuple(found.planes), around.noise, around.spacing, notes, figures)
 
 
-def whole_boards(parts: Parts, capture: Capture, options: WholeOptions | None = None) -> tuple[Sheet, ...]:
-    """The boards run on over what nobody saw, and parted where they lie side by side.
+def made_whole(parts: Parts, found: Candidates, options: WholeOptions | None = None) -> Parts:
+    """The parts with their boards aligned, run on over what nobody saw, and parted where they lie side by side.
 
-    Assembly does not start from these, for it decides how far boards go from all their contacts; they are what
-    identification knows by itself. Raises StageError when their alignment does not converge.
+    Raises StageError when their alignment does not converge.
     """
-    from kerfwright.identify.freespace import see_through
-    from kerfwright.identify.photo_edges import Photos
-    from kerfwright.identify.whole import made_whole
+    from kerfwright.identify.whole import whole_boards
 
-    free = see_through(capture, parts.spacing, max(5 * parts.noise, capture.cloud.diameter / 150))
-    return made_whole(parts.sheets, capture.cloud, Photos(capture), free, options or WholeOptions())
+    cloud, options = found.capture.cloud, options or WholeOptions()
+    sheets, ends = whole_boards(parts.sheets, cloud, found.photos, found.free, options)
+    return replace(parts, sheets=sheets, ends=ends)
 
 
 def _selected(cloud: Cloud, slabs: list[Slab], evidence: Evidence, options: IdentifyOptions) -> Selection:

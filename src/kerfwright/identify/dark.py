@@ -18,10 +18,9 @@ import shapely
 from kerfwright.capture.types import Capture, Cloud
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.options import IdentifyOptions
-from kerfwright.identify.primitives import Neighbourhood
 from kerfwright.identify.slabs import Slab, free_share, plane_frame
 from kerfwright.identify.thickness import ThicknessHypothesis
-from kerfwright.identify.types import Primitive
+from kerfwright.identify.types import Neighbourhood, Primitive
 
 __all__ = ["dark_slabs", "with_dark_boards"]
 

@@ -49,8 +49,10 @@ class _Groove:
     high: float
 
 
-def parted(sheets: Sequence[Sheet], cloud: Cloud) -> tuple[Sheet, ...]:
-    """The sheets, each that has grooves right across it as its pieces; then all are numbered anew."""
+def parted(sheets: Sequence[Sheet], cloud: Cloud) -> tuple[tuple[Sheet, ...], dict[str, tuple[str, ...]]]:
+    """The sheets, each that has grooves right across it as its pieces, numbered anew where there are such; and the new
+    names by the old ones.
+    """
     most = max((_density(s) for s in sheets), default=0.0)
     out: list[Sheet] = []
     for sheet in sheets:
@@ -58,8 +60,10 @@ def parted(sheets: Sequence[Sheet], cloud: Cloud) -> tuple[Sheet, ...]:
         grooves = _grooves(sheet, [s for s in sheets if s is not sheet], cloud) if seen_well else []
         out += _pieces(sheet, grooves, cloud) if grooves else [sheet]
     if len(out) == len(sheets):
-        return tuple(sheets)
-    return tuple(replace(sheet, name=f"board_{k + 1:02d}") for k, sheet in enumerate(out))
+        return tuple(sheets), {s.name: (s.name,) for s in sheets}
+    numbered = tuple(replace(sheet, name=f"board_{k + 1:02d}") for k, sheet in enumerate(out))
+    names = {s.name: tuple(new.name for old, new in zip(out, numbered, strict=True) if old.name == s.name) for s in out}
+    return numbered, names
 
 
 def _density(sheet: Sheet) -> float:

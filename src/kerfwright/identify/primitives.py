@@ -6,30 +6,17 @@ same connected plane patches in one deterministic pass: see docs/method.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.spatial import cKDTree
 
 from kerfwright.capture.types import Cloud
 from kerfwright.errors import StageError
 from kerfwright.identify.options import IdentifyOptions
-from kerfwright.identify.types import Primitive
+from kerfwright.identify.types import Neighbourhood, Primitive
 
-__all__ = ["Neighbourhood", "find_planes", "look_around", "plane_fit"]
+__all__ = ["find_planes", "look_around", "plane_fit"]
 
 CHUNK = 100_000  # points whose neighbourhoods are in memory at once
-
-
-@dataclass(frozen=True, eq=False)
-class Neighbourhood:
-    """Local geometry of a cloud: neighbour indices (N, K), smoothed normals (N, 3), residual (N,) mm, noise mm."""
-
-    neighbour_idx: np.ndarray
-    normals: np.ndarray
-    residual: np.ndarray
-    noise: float
-    spacing: float  # median distance to the third nearest point, mm
 
 
 def look_around(cloud: Cloud, options: IdentifyOptions) -> Neighbourhood:

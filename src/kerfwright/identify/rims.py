@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from shapely.geometry import Polygon
 
 from kerfwright.capture.types import Cloud
-from kerfwright.identify.primitives import Neighbourhood
+from kerfwright.identify.types import Neighbourhood
 
 __all__ = ["CutPoints", "Rim", "cut_points", "outline_samples", "trace_rim"]
 

@@ -28,19 +28,20 @@ class _End:
     origin: str  # "contact" or "ground"
 
 
-def run_on(scene: Scene) -> tuple[Sheet, ...]:
-    """The sheets of a scene with their regions run on to what they end on."""
+def run_on(scene: Scene) -> tuple[tuple[Sheet, ...], list[Joint]]:
+    """The sheets of a scene with their regions run on to what they end on; and in which joints they end on others."""
     ends: list[list[_End]] = [[] for _ in scene.sheets]
-    for a, b in combinations(range(len(scene.sheets)), 2):
-        for joint in _joints(scene, a, b):
-            ends[joint.b] += _ends(joint.trace, joint.intervals, "contact")
+    pairs = combinations(range(len(scene.sheets)), 2)
+    joints = [joint for a, b in pairs for joint in _joints(scene, a, b)]
+    for joint in joints:
+        ends[joint.b] += _ends(joint.trace, joint.intervals, "contact")
     out = []
     for sheet, own in zip(scene.sheets, ends, strict=True):
         floor = floor_trace(sheet)
         if floor is not None:
             own += _ends(floor, floor_runs(sheet, floor, (), scene.diameter, scene.options), "ground")
         out.append(replace(sheet, region=filled_region(sheet.region, own, scene.mm(scene.options.far_reach))))
-    return tuple(out)
+    return tuple(out), joints
 
 
 def _joints(scene: Scene, a: int, b: int) -> list[Joint]:

@@ -18,8 +18,8 @@ from scipy.sparse import coo_array
 from kerfwright.capture.types import Cloud
 from kerfwright.errors import StageError
 from kerfwright.identify.options import IdentifyOptions
-from kerfwright.identify.primitives import Neighbourhood
 from kerfwright.identify.slabs import UNSEEN, Slab
+from kerfwright.identify.types import Neighbourhood
 
 __all__ = ["Evidence", "Selection", "explained_share", "gather_evidence", "program_value", "select_exact"]
 

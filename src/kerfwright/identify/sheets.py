@@ -10,10 +10,9 @@ from shapely.geometry import Polygon
 
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.options import IdentifyOptions
-from kerfwright.identify.primitives import Neighbourhood
 from kerfwright.identify.rims import trace_rim
 from kerfwright.identify.slabs import Slab, footprint
-from kerfwright.identify.types import Sheet
+from kerfwright.identify.types import Neighbourhood, Sheet
 from kerfwright.model import Origin, Quantity
 
 __all__ = ["join_across", "to_sheet"]

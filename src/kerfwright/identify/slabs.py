@@ -19,7 +19,6 @@ from kerfwright.identify.bars import Bar, find_bars
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.options import IdentifyOptions
 from kerfwright.identify.photo_edges import Photos
-from kerfwright.identify.primitives import Neighbourhood
 from kerfwright.identify.regions import Raster, occupancy, polygons
 from kerfwright.identify.rims import trace_rim
 from kerfwright.identify.thickness import (
@@ -31,7 +30,7 @@ from kerfwright.identify.thickness import (
     sharpened,
 )
 from kerfwright.identify.told import Known, told_by_others
-from kerfwright.identify.types import Primitive
+from kerfwright.identify.types import Neighbourhood, Primitive
 from kerfwright.parallel import each
 
 __all__ = ["Slab", "candidate_slabs", "footprint", "free_share", "plane_frame"]

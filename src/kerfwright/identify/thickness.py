@@ -17,9 +17,8 @@ from shapely.geometry import MultiPoint, Polygon
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.photo_edges import Photos, SweepResult, refine_peak, sweep_edge
-from kerfwright.identify.primitives import Neighbourhood
 from kerfwright.identify.rims import Rim, cut_points, outline_samples
-from kerfwright.identify.types import Primitive
+from kerfwright.identify.types import Neighbourhood, Primitive
 
 __all__ = [
     "ThicknessHypothesis", "from_cut_faces", "from_opposite", "from_photos", "looking_at", "reaches_ground",

@@ -17,9 +17,9 @@ from kerfwright.capture.types import Capture
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.options import IdentifyOptions
 from kerfwright.identify.photo_edges import Photos
-from kerfwright.identify.primitives import Neighbourhood
 from kerfwright.identify.rims import Rim
 from kerfwright.identify.thickness import ThicknessHypothesis, from_cut_faces, from_photos, sharpened
+from kerfwright.identify.types import Neighbourhood
 
 __all__ = ["Known", "told_by_others"]
 

@@ -9,7 +9,7 @@ from shapely.geometry import Polygon
 
 from kerfwright.model import Quantity
 
-__all__ = ["Parts", "Primitive", "Sheet"]
+__all__ = ["Neighbourhood", "Parts", "Planes", "Primitive", "Sheet"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +23,25 @@ class Primitive:
     centroid: np.ndarray  # (3,)
     sigma: float  # robust noise of its points across it, mm
     radius: float | None = None  # of a cylinder
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbourhood:
+    """Local geometry of a cloud: neighbour indices (N, K), smoothed normals (N, 3), residual (N,) mm, noise mm."""
+
+    neighbour_idx: np.ndarray
+    normals: np.ndarray
+    residual: np.ndarray
+    noise: float
+    spacing: float  # median distance to the third nearest point, mm
+
+
+@dataclass(frozen=True, eq=False)
+class Planes:
+    """The connected plane patches of a cloud, largest first, and its local geometry."""
+
+    around: Neighbourhood
+    patches: tuple[Primitive, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +78,8 @@ class Sheet:
 class Parts:
     """The selected rough boards, the planes they were found in, and what the selection said.
 
-    `sheets` go as far as the cloud shows them, two that stereo joined still as one; `identify.whole_boards` has them as
-    far as they go.
+    What `identify` gives has `sheets` aligned to each other and as far as they go, which may be beyond what the cloud
+    shows; what `choose` gives has them as they were seen.
     """
 
     sheets: tuple[Sheet, ...]
@@ -69,3 +88,4 @@ class Parts:
     spacing: float = 1.0  # median distance to the third nearest point, mm
     notes: tuple[str, ...] = ()
     selection: dict | None = None  # objective, bound, gap, candidates: for the report
+    ends: tuple[tuple[str, str], ...] = ()  # names a, b: board b was run on to a

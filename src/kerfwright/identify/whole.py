@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.align import align_sheets
 from kerfwright.identify.freespace import FreeSpace
-from kerfwright.identify.gaps import filled_out, mended
+from kerfwright.identify.gaps import mended
 from kerfwright.identify.grooves import parted
 from kerfwright.identify.laid import laid_on
 from kerfwright.identify.options import WholeOptions
@@ -22,20 +22,23 @@ from kerfwright.identify.run_on import run_on
 from kerfwright.identify.types import Sheet
 from kerfwright.identify.visibility import Obstacles
 
-__all__ = ["made_whole"]
+__all__ = ["whole_boards"]
 
 
-def made_whole(
+def whole_boards(
     sheets: Sequence[Sheet], cloud: Cloud, photos: Photos, free: FreeSpace, options: WholeOptions
-) -> tuple[Sheet, ...]:
-    """The boards, as far as they go and as thick as they are.
+) -> tuple[tuple[Sheet, ...], tuple[tuple[str, str], ...]]:
+    """The boards, as far as they go and as thick as they are; and by name, who was run on to whom: (a, b) for b to a.
 
     Their sheet planes are aligned first: over the length of a board in the dark, half a degree is millimetres.
     Raises StageError when the alignment does not converge.
     """
     aligned, _ = align_sheets(tuple(sheets), cloud, options)
     whole = mended(laid_on(aligned, cloud, free, options), cloud, free, options)
+    ends: set[tuple[str, str]] = set()
     for _ in range(options.passes):
         obstacles = Obstacles(whole, options.outline_error * cloud.diameter)
-        whole = run_on(Scene(whole, cloud, photos, obstacles, free, options))
-    return parted(filled_out(whole, cloud, free, options), cloud)
+        whole, joints = run_on(Scene(whole, cloud, photos, obstacles, free, options))
+        ends |= {(whole[j.a].name, whole[j.b].name) for j in joints}
+    pieces, names = parted(whole, cloud)
+    return pieces, tuple(sorted((a, b) for one, other in ends for a in names[one] for b in names[other]))

@@ -120,7 +120,7 @@ def assembled_again(
     pieces: Sequence[Piece], parts: Parts, capture: Capture, options: RefineOptions
 ) -> tuple[tuple[Outline, ...], Assembly]:
     """One outline a board and the assembly found with them."""
-    found = replace(parts, sheets=tuple(p.sheet for p in pieces))
+    found = replace(parts, sheets=tuple(p.sheet for p in pieces), ends=())
     again = assemble(found, capture, replace(EXACT, stock=options.stock))
     again = with_abutting(_with_seams(again, pieces), capture.cloud.diameter)
     again = kept_apart(again, capture.cloud.diameter)
