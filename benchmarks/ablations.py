@@ -18,7 +18,7 @@ from kerfwright.evaluate import evaluate_model, read_truth
 from kerfwright.pipeline import LEFT_OUT, STAGES, ReconstructOptions, run_stages
 from kerfwright.progress import Reporter
 
-FIRST = ("capture", "identify", "assemble")  # what no ablation changes
+FIRST = ("capture", "planes", "identify", "assemble")  # what no ablation changes
 HEADER = (
     "object", "without", "boards", "IoU seen", "seen to model %", "cloud to model %", "contacts typed (found)",
     "cut mm, worst board", "nodes right (spurious)", "overlap mm3",

@@ -155,6 +155,7 @@ def beside_the_paper(rows: dict[str, dict[str, Any]]) -> str:
         )
         row, s = rows[name], rows[name].get("score") or {}
         took = row["run"]["stages"]
+        took = took | {"identify": took.get("planes", 0) + took.get("identify", 0)}  # one stage in the paper
         rmse_here = s.get("rmse_pct_cloud_to_model")
         out.append([
             f"{name}, here", str(row["images"]), ratio(s.get("parts_matched"), s.get("parts_true")),

@@ -80,7 +80,7 @@ def _wait_for_group(group: int, patience: float = 5.0) -> None:
 
 
 def _kept(folder: Path) -> str:
-    order = ("capture", "identify", "assemble", "refine", "check")
+    order = ("capture", "planes", "identify", "assemble", "refine", "check")
     there = {p.name.rsplit("-", 1)[0] for p in (folder / ".cache").glob("*-*") if p.suffix != ".partial"}
     return ", ".join(name for name in order if name in there) or "-"
 

@@ -23,12 +23,14 @@ __all__ = ["Rough", "free_space", "match", "rough_boards", "seen_on", "side_by_s
 
 CLOSE_DEGREES = 10.0  # between sheet normals of boards that may be the same
 LEAST_OVERLAP = 0.3  # of their outlines
+NEEDED = ("capture", "identify", "assemble")
+LAST = [stage.name for stage in STAGES].index(NEEDED[-1])
 MOSTLY = 0.7  # of a true board, that lies in a rough one of which it is a part
 
 
 @dataclass(frozen=True, eq=False)
 class Rough:
-    """What the first three stages made, and the truth as sheets in the same frame and unit."""
+    """What the stages before `refine` made, and the truth as sheets in the same frame and unit."""
 
     capture: Capture
     parts: Parts
@@ -40,10 +42,9 @@ class Rough:
 def rough_boards(folder: Path, kept: Path | None = None) -> Rough:
     """The stages before `refine` of one capture; from the .cache of kept/NAME where that is there."""
     cache = None if kept is None else kept / folder.name / ".cache"
-    names = [stage.name for stage in STAGES[:3]]
-    found = {n: read_kept(cache, n) if cache and cache.is_dir() else None for n in names}
-    if any(found[n] is None for n in names):
-        found = run_stages(folder, ReconstructOptions(), Reporter(), stages=STAGES[:3])
+    found = {n: read_kept(cache, n) if cache and cache.is_dir() else None for n in NEEDED}
+    if any(found[n] is None for n in NEEDED):
+        found = run_stages(folder, ReconstructOptions(), Reporter(), stages=STAGES[: LAST + 1])
     truth, capture = read_truth(folder / "truth"), found["capture"]
     world_from_truth = np.linalg.inv(capture.capture_from_world) @ truth.capture_from_truth
     boards = tuple(_true_sheet(truth, k, world_from_truth) for k in range(len(truth.boards)))

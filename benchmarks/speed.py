@@ -24,7 +24,7 @@ BOARDS = (4, 8, 16, 32, 60)
 CABINET = CaptureOptions(
     dataset=DatasetOptions(images=24, width=800, height=600), cloud=CloudOptions(points=200_000)
 )  # fmt: skip
-STAGES = ("capture", "identify", "assemble", "refine", "check")
+STAGES = ("capture", "planes", "identify", "assemble", "refine", "check")
 NOISE = 0.2  # seconds below which a stage's growth is not worth a number
 
 

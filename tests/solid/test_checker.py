@@ -8,6 +8,7 @@ import pytest
 from kerfwright.errors import OptionError
 from kerfwright.model import Arc, Bezier, Line, Loop, Model, Quantity
 from kerfwright.model.frames import rows
+from kerfwright.model.resize import resized_board, resized_contact
 from kerfwright.solid import CheckOptions, check
 from simple import bevel, board, hole, placed, polygon, rectangle, stool
 
@@ -22,6 +23,14 @@ def moved(model: Model, index: int, x=0.0, y=0.0, z=0.0) -> Model:
     pose = np.array(model.boards[index].model_from_board)
     pose[:3, 3] += (x, y, z)
     return change(model, index, model_from_board=rows(pose))
+
+
+def shrunk(model: Model, factor: float) -> Model:
+    smaller = np.diag([factor, factor, factor, 1.0])
+    return model.model_copy(update={
+        "boards": tuple(resized_board(b, smaller) for b in model.boards),
+        "contacts": tuple(resized_contact(c, smaller) for c in model.contacts),
+    })
 
 
 def codes(model: Model, **options) -> list[str]:
@@ -79,6 +88,13 @@ def test_contacts_that_do_not_touch_and_floating_boards():
         ("K111", ("top", "leg left")),
         ("K112", ("leg left",)),
     }
+
+
+def test_what_is_smaller_than_the_tolerances_is_checked_in_proportion():
+    tiny = shrunk(stool(), 1e-3)
+    assert {f.code for f in check(tiny)} == {"K204", "K211"}, "its boards are narrower than any tool"
+    apart = check(shrunk(moved(stool(), 1, x=-300), 1e-3))
+    assert {f.code for f in apart if f.severity == "error"} == {"K111", "K112"}
 
 
 def test_unlisted_contacts_are_noted_and_hold():

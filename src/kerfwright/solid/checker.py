@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -25,12 +25,13 @@ from kerfwright.solid.workshop import bevel_angle, fits_rectangle, inside_radius
 __all__ = ["CheckOptions", "check"]
 
 SAW_SCALE = 0.05  # degrees; finer than the scale of a saw's tilt
+LEAST_SIZE = 100.0  # mm of the whole; what a smaller one is asked for shrinks with it, for its scale must be wrong
 AREA_AGREES = 0.25  # of the larger area, as contacts are commonly compared
 
 
 @dataclass(frozen=True)
 class CheckOptions:
-    """What the checker asks for; lengths in mm.
+    """What the checker asks for; lengths in mm, for a whole of LEAST_SIZE at least.
 
     Raises
     ------
@@ -73,8 +74,25 @@ def check(model: Model, options: CheckOptions | None = None) -> tuple[Finding, .
     for board in sound:
         findings += _solid_findings(board, shapes)
     findings += [f for board in sound for f in _workshop_findings(board, options)]
+    size = _size(shapes)
+    if 0 < size < LEAST_SIZE:
+        findings.append(finding("K211", value=size, size=LEAST_SIZE))
+        options = _shrunk(options, size / LEAST_SIZE)
     findings += _assembly_findings(model, shapes, options)
     return tuple(sorted(findings, key=lambda f: f.code))
+
+
+def _size(shapes: list[Shape]) -> float:
+    """mm of the longest side of the box about all solids; 0 when there are none."""
+    if not shapes:
+        return 0.0
+    return float(np.ptp(np.concatenate([shape.points for shape in shapes]), axis=0).max())
+
+
+def _shrunk(options: CheckOptions, factor: float) -> CheckOptions:
+    """What is asked of how boards meet, for an object that is so many times as large."""
+    powers = {"snug": 1, "reach": 1, "ground": 1, "contact_area": 2, "shared_volume": 3}
+    return replace(options, **{name: getattr(options, name) * factor**k for name, k in powers.items()})
 
 
 def _fault_finding(fault: Fault) -> Finding:

@@ -43,6 +43,10 @@ _TEXTS = {
         "trust the plane: the solids are cut by it",
     ),
     "K210": ("{a} and {b}: contact {index} says {said:.0f} mm2, the solids meet on {value:.0f}", "trust the solids"),
+    "K211": (
+        "the whole is only {value:.2g} mm long: it is checked as if it were {size:g} mm",
+        "give its size: --length or --scale",
+    ),
     "K301": (
         "{a} and {b} touch on {value:.0f} mm2, and no contact says so",
         "add the contact if they are to be joined",

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Meeting", "interface_polygons", "meet", "touching"]
 
-LEAST_AREA = 0.01  # mm2; less is rounding along a shared edge
+LEAST_AREA = 0.01  # mm2; less is rounding along a shared edge,
+LEAST_SHARE = 2e-6  # as is less of the smaller face where that is smaller still
 
 
 @dataclass(frozen=True)
@@ -63,8 +64,9 @@ def _pair(
     """Two faces: the overlap of their projections, and their distance at its corners."""
     if not _near(fa, fb, normal, reach):
         return None
-    shared = fa.polygon(origin, axes).intersection(fb.polygon(origin, axes))
-    if shared.area < LEAST_AREA:
+    areas = fa.polygon(origin, axes), fb.polygon(origin, axes)
+    shared = areas[0].intersection(areas[1])
+    if shared.area < min(LEAST_AREA, LEAST_SHARE * min(a.area for a in areas)):
         return None
     corners = origin + _corners(shared) @ axes
     distance = _height(fb, corners, normal) - _height(fa, corners, normal)
