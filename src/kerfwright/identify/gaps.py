@@ -20,13 +20,14 @@ from kerfwright.identify.options import WholeOptions
 from kerfwright.identify.outlines import largest_piece
 from kerfwright.identify.types import Sheet
 
-__all__ = ["is_seen", "is_thin", "mended", "places_in", "usual_density"]
+__all__ = ["filled_out", "is_seen", "is_thin", "mended", "places_in", "usual_density"]
 
 LINED = 0.15  # of a gap's outline; beyond, cut faces show that it is real
 SEEN = 0.3  # of a gap's area; beyond, it was seen through
 USUAL = 0.75  # quantile of the boards' densities that counts as seen well
 DENSE = 0.6  # of that density: a gap in such wood is real
 SAMPLES = 60
+HULL = 0.85  # of its convex hull's area, which a board in rags has at most; others have an outline worth keeping
 
 
 def mended(sheets: tuple[Sheet, ...], cloud: Cloud, free: FreeSpace, options: WholeOptions) -> tuple[Sheet, ...]:
@@ -34,6 +35,19 @@ def mended(sheets: tuple[Sheet, ...], cloud: Cloud, free: FreeSpace, options: Wh
     reach, near = options.veil * cloud.diameter, options.end_offset * 2 * cloud.diameter
     dense = usual_density(sheets, cloud)
     return tuple(_mended(sheet, cloud, free, reach, near, dense) for sheet in sheets)
+
+
+def filled_out(sheets: tuple[Sheet, ...], cloud: Cloud, free: FreeSpace, options: WholeOptions) -> tuple[Sheet, ...]:
+    """The sheets, those that are seen in rags with every bay of their outline filled that is only a gap of the cloud.
+
+    What stereo shows of a board in the dark says that there is wood, and nothing of where it ends.
+    """
+    near, dense = options.end_offset * 2 * cloud.diameter, usual_density(sheets, cloud)
+    return tuple(
+        _filled(s, s.region.convex_hull, cloud, free, near, dense)
+        if s.region.area < HULL * s.region.convex_hull.area else s
+        for s in sheets
+    )
 
 
 def usual_density(sheets: Sequence[Sheet], cloud: Cloud) -> float:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.align import align_sheets
 from kerfwright.identify.freespace import FreeSpace
-from kerfwright.identify.gaps import mended
+from kerfwright.identify.gaps import filled_out, mended
 from kerfwright.identify.grooves import parted
 from kerfwright.identify.laid import laid_on
 from kerfwright.identify.options import WholeOptions
@@ -40,5 +40,5 @@ def whole_boards(
         obstacles = Obstacles(whole, options.outline_error * cloud.diameter)
         whole, joints = run_on(Scene(whole, cloud, photos, obstacles, free, options))
         ends |= {(whole[j.a].name, whole[j.b].name) for j in joints}
-    pieces, names = parted(whole, cloud)
+    pieces, names = parted(filled_out(whole, cloud, free, options), cloud)
     return pieces, tuple(sorted((a, b) for one, other in ends for a in names[one] for b in names[other]))
