@@ -28,7 +28,7 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     from kerfwright.assemble.contacts import to_contact
     from kerfwright.assemble.depths import remeasured
     from kerfwright.assemble.laid import laid_contacts
-    from kerfwright.assemble.veils import still_open
+    from kerfwright.assemble.veils import still_open, unveiled
     from kerfwright.identify.align import align_sheets
     from kerfwright.identify.freespace import see_through
     from kerfwright.identify.photo_edges import Photos
@@ -38,7 +38,7 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     free = see_through(capture, parts.spacing, max(5 * parts.noise, diameter / 150))
     photos = Photos(capture)
     if options.rough:
-        sheets, edges = _whole(parts.sheets, capture.cloud, photos, free, options)
+        sheets, edges = unveiled(parts.sheets, capture.cloud, photos, options)
     else:
         sheets, _ = align_sheets(parts.sheets, capture.cloud, options)
         sheets, edges = remeasured(sheets, capture.cloud, photos, parts.noise), tuple(() for _ in sheets)
@@ -52,28 +52,14 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     return Assembly(sheets, contacts, tuple(a + b for a, b in zip(segments, edges, strict=True)), findings)
 
 
-def _whole(
-    sheets: tuple[Sheet, ...], cloud: Cloud, photos: Photos, free: FreeSpace, options: AssembleOptions
-) -> tuple[tuple[Sheet, ...], tuple[tuple[ConstraintSegment, ...], ...]]:
-    """The boards of the cloud put together from their pieces, without veils, and the edges where these were cut off."""
-    from kerfwright.assemble.crossings import crossings_settled
-    from kerfwright.assemble.rags import pieced_together
-    from kerfwright.assemble.veils import unveiled
-    from kerfwright.identify.visibility import Obstacles
-
-    sheets = pieced_together(sheets, cloud, free, options)
-    sheets = crossings_settled(sheets, cloud, photos, Obstacles(sheets, options.outline_error * cloud.diameter))
-    return unveiled(sheets, cloud, photos, options)
-
-
 def _with_hidden_faces(
     sheets: tuple[Sheet, ...], cloud: Cloud, photos: Photos, free: FreeSpace, options: AssembleOptions
 ) -> tuple[Sheet, ...]:
     """The boards with gaps of the cloud filled, thicknesses shared, and faces where others hide them."""
     from kerfwright.assemble.backs import measured_backs
-    from kerfwright.assemble.covered import backed_by_ends
     from kerfwright.assemble.flush import flush_neighbours
     from kerfwright.assemble.stock import share_thickness
+    from kerfwright.identify.covered import backed_by_ends
     from kerfwright.identify.gaps import mended
     from kerfwright.identify.laid import laid_on
 

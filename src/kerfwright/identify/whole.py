@@ -1,8 +1,8 @@
 """Boards made whole: what the cloud shows in part goes on to where other boards, or the photographs, say it ends.
 
-Selection knows that a board is there; its region stops where stereo does. Boards in the dark are run on to what they
-end on, hidden faces are put where the board that hides them begins, and boards side by side that stereo joined over the
-gap between them are parted.
+Selection knows that a board is there; its region stops where stereo does. Pieces of one board are joined, boards in the
+dark are run on to what they end on, hidden faces are put where the board that hides them begins, and boards side by
+side that stereo joined over the gap between them are parted.
 """
 
 from __future__ import annotations
@@ -11,12 +11,14 @@ from collections.abc import Sequence
 
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.align import align_sheets
+from kerfwright.identify.crossings import crossings_settled
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.gaps import filled_out, mended
 from kerfwright.identify.grooves import parted
 from kerfwright.identify.laid import laid_on
 from kerfwright.identify.options import WholeOptions
 from kerfwright.identify.photo_edges import Photos
+from kerfwright.identify.rags import pieced_together
 from kerfwright.identify.reaching import Scene
 from kerfwright.identify.run_on import run_on
 from kerfwright.identify.types import Sheet
@@ -33,8 +35,10 @@ def whole_boards(
     Their sheet planes are aligned first: over the length of a board in the dark, half a degree is millimetres.
     Raises StageError when the alignment does not converge.
     """
-    aligned, _ = align_sheets(tuple(sheets), cloud, options)
-    whole = mended(laid_on(aligned, cloud, free, options), cloud, free, options)
+    whole, _ = align_sheets(tuple(sheets), cloud, options)
+    whole = pieced_together(whole, cloud, free, options)
+    whole = crossings_settled(whole, cloud, photos, Obstacles(whole, options.outline_error * cloud.diameter))
+    whole = mended(laid_on(whole, cloud, free, options), cloud, free, options)
     ends: set[tuple[str, str]] = set()
     for _ in range(options.passes):
         obstacles = Obstacles(whole, options.outline_error * cloud.diameter)

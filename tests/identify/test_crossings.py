@@ -5,8 +5,8 @@ import pytest
 from shapely.geometry import box
 
 from clouds import pose, sheet
-from kerfwright.assemble.crossings import crossings_settled
 from kerfwright.capture.types import Cloud
+from kerfwright.identify.crossings import crossings_settled
 from painted import Painted, nothing_hides
 
 SIZE = 400.0

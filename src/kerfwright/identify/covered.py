@@ -13,8 +13,8 @@ import numpy as np
 import shapely
 from shapely.geometry import LineString, MultiPoint, Polygon
 
-from kerfwright.assemble.options import AssembleOptions
 from kerfwright.identify.joints import Trace, face_plane, trace_of
+from kerfwright.identify.options import WholeOptions
 from kerfwright.identify.outlines import largest_piece
 from kerfwright.identify.types import Sheet
 
@@ -26,7 +26,7 @@ GOES_ON = 0.3  # share of an end that may go on behind the board
 FAR = 1e5  # mm; longer than any board
 
 
-def backed_by_ends(sheets: Sequence[Sheet], diameter: float, options: AssembleOptions) -> tuple[Sheet, ...]:
+def backed_by_ends(sheets: Sequence[Sheet], diameter: float, options: WholeOptions) -> tuple[Sheet, ...]:
     """The sheets with wood behind the ends of others that stand on their faces."""
     slack = options.outline_error * diameter
     out = []

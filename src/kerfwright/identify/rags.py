@@ -16,12 +16,12 @@ import shapely
 from scipy.spatial import cKDTree
 from shapely.geometry import Polygon
 
-from kerfwright.assemble.covered import end_sections
-from kerfwright.assemble.options import AssembleOptions
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.coplanar import in_one_plane, moved_region, united
+from kerfwright.identify.covered import end_sections
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.gaps import is_seen, is_thin, places_in, usual_density
+from kerfwright.identify.options import WholeOptions
 from kerfwright.identify.outlines import largest_piece
 from kerfwright.identify.types import Sheet
 
@@ -49,7 +49,7 @@ class _Scene:
 
 
 def pieced_together(
-    sheets: Sequence[Sheet], cloud: Cloud, free: FreeSpace, options: AssembleOptions
+    sheets: Sequence[Sheet], cloud: Cloud, free: FreeSpace, options: WholeOptions
 ) -> tuple[Sheet, ...]:
     """The sheets with pieces of one board joined; the larger one keeps its name and place."""
     near, short = 2 * options.end_offset * cloud.diameter, options.ground_reach * cloud.diameter

@@ -4,8 +4,8 @@ import pytest
 from shapely.geometry import box
 
 from clouds import pose, sheet
-from kerfwright.assemble import AssembleOptions
-from kerfwright.assemble.covered import backed_by_ends
+from kerfwright.identify.covered import backed_by_ends
+from kerfwright.identify.options import WholeOptions
 
 UPRIGHT = pose((0, 0, 0), (1, 0, 0), (0, 0, 1))  # its normal is -y
 NOTCHED = box(0, 0, 300, 200).difference(box(140, 0, 160, 60))
@@ -19,7 +19,7 @@ def frame_and_foot(region=NOTCHED, start=0.0, length=80.0):
 
 
 def areas(*boards):
-    return [s.region.area for s in backed_by_ends(boards, 500, AssembleOptions())]
+    return [s.region.area for s in backed_by_ends(boards, 500, WholeOptions())]
 
 
 def test_the_place_behind_a_foot_is_wood():

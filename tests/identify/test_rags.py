@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from clouds import pose, sheet
-from kerfwright.assemble import AssembleOptions
-from kerfwright.assemble.rags import pieced_together
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.freespace import FreeSpace
+from kerfwright.identify.options import WholeOptions
+from kerfwright.identify.rags import pieced_together
 
 BLIND = FreeSpace((), (), 1.0, 1.0)
-OPTIONS = AssembleOptions()
+OPTIONS = WholeOptions()
 LEVEL = pose((0, 0, 200))
 
 
