@@ -108,7 +108,7 @@ class Counted:
 
 def test_a_stage_is_run_again_only_when_what_it_is_told_or_shown_has_changed(tmp_path):
     counted = Counted(tmp_path)
-    assert counted.again() == "capture identify assemble refine check"
+    assert counted.again() == "capture planes identify assemble refine check"
     assert counted.again() == ""
     assert counted.again(millimetres_per_unit=25.0) == "capture check"
     assert counted.again(length="top:x=420mm") == "capture check", "the capture without a scale was dropped"
