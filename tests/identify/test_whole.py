@@ -87,16 +87,20 @@ def board_seen(name, region, points, start, **rest):
     ("spacing", "arm", "filled"), [(8.0, -60, True), (2.8, -60, False), (2.0, -60, False), (8.0, 120, False)]
 )
 def test_bays_of_a_board_in_the_dark_are_filled(spacing, arm, filled):
-    """Beside a board seen well, one of an L's shape: in rags its bay is the cloud's, else it is the wood's; a small bay
-    is left to the photographs.
+    """Beside boards seen well, one of an L's shape: in rags its bay is the cloud's, else it is the wood's, as an arch
+    in the dark is; a small bay is left to the photographs.
     """
     ell = shapely.union_all([box(-150, -100, 150, 0), box(-150, -100, arm, 100)])
     well, rags = face(-150, -100, 150, 100, 2.0), face(-150, -100, 150, 100, spacing)
     rags = rags[shapely.contains_xy(ell, rags[:, 0], rags[:, 1])]
-    points = np.concatenate([well, rags])
+    points = np.concatenate([well, well, rags])
     cloud = cloud_of(points, np.tile(UP, (len(points), 1)))
-    boards = board_seen("well", box(-150, -100, 150, 100), well, 2), board_seen("rags", ell, rags, 2 + len(well))
-    assert (filled_out(boards, cloud, BLIND, OPTIONS)[1].region.area > 1.01 * ell.area) == filled
+    whole = box(-150, -100, 150, 100)
+    boards = (
+        board_seen("well", whole, well, 2), board_seen("twin", whole, well, 2 + len(well)),
+        board_seen("rags", ell, rags, 2 + 2 * len(well)),
+    )
+    assert (filled_out(boards, cloud, BLIND, OPTIONS)[2].region.area > 1.01 * ell.area) == filled
 
 
 def tops(gap: float, sag: float, turn: float = 0.0, spacing: float = 1.5):

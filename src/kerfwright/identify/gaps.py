@@ -27,7 +27,8 @@ SEEN = 0.3  # of a gap's area; beyond, it was seen through
 USUAL = 0.75  # quantile of the boards' densities that counts as seen well
 DENSE = 0.6  # of that density: a gap in such wood is real
 SAMPLES = 60
-HULL = 0.85  # of its convex hull's area, which a board in rags has at most; others have an outline worth keeping
+RAGS = 0.35  # of the points of faces seen well, at most, that a board has which is seen in rags,
+HULL = 0.85  # and of its convex hull's area; what fills more of it has an outline worth keeping
 
 
 def mended(sheets: tuple[Sheet, ...], cloud: Cloud, free: FreeSpace, options: WholeOptions) -> tuple[Sheet, ...]:
@@ -44,10 +45,15 @@ def filled_out(sheets: tuple[Sheet, ...], cloud: Cloud, free: FreeSpace, options
     """
     near, dense = options.end_offset * 2 * cloud.diameter, usual_density(sheets, cloud)
     return tuple(
-        _filled(s, s.region.convex_hull, cloud, free, near, dense)
-        if s.region.area < HULL * s.region.convex_hull.area else s
-        for s in sheets
+        _filled(sheet, sheet.region.convex_hull, cloud, free, near, dense) if _in_rags(sheet, cloud, dense) else sheet
+        for sheet in sheets
     )
+
+
+def _in_rags(sheet: Sheet, cloud: Cloud, dense: float) -> bool:
+    """Whether a board shows few points, and those in pieces."""
+    area, hull = sheet.region.area, sheet.region.convex_hull.area
+    return len(_face(sheet, cloud)) < RAGS / DENSE * dense * area and area < HULL * hull
 
 
 def usual_density(sheets: Sequence[Sheet], cloud: Cloud) -> float:
