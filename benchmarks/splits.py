@@ -42,8 +42,7 @@ from kerfwright.synthetic.meshes import mesh_in_model
 from kerfwright.synthetic.render import photograph
 from kerfwright.synthetic.stage import build_stage
 
-VIEWS = 7  # of the 30 that a whole capture has: fewer than the detector would use there
-LEAST_ELEVATION = 22.0  # degrees, from which a photograph shows a level sheet
+LEAST_ELEVATION = 22.0  # degrees, from which a photograph shows a level sheet: 21 of a whole capture's 30
 ANGLE_NOISE = 0.02  # degrees, of sheet and poses
 OFFSET_NOISE = 0.2  # mm, of the sheet's plane and outline
 RIGHT = 2.0  # mm by which a seam may be off
@@ -173,11 +172,11 @@ def _photographed(model: Model, options: CaptureOptions) -> list[tuple[Camera, n
     poses = camera_path(*stage.bounds, options.dataset, np.random.default_rng([seed, 1]))
     poses = [p for p in poses if np.degrees(np.arcsin(-p[2, 2])) > LEAST_ELEVATION]
     rng, camera, shots = np.random.default_rng([seed, 2]), intrinsics(options.dataset), []
-    for k in np.linspace(0, len(poses) - 1, VIEWS).round().astype(int):
-        cut = _cut_out(camera, poses[k], model)
-        picture = photograph(stage, cut, poses[k], rng)
+    for pose in poses:
+        cut = _cut_out(camera, pose, model)
+        picture = photograph(stage, cut, pose, rng)
         jpeg = cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, options.images.quality])[1]
-        shots.append((cut, _slightly_turned(poses[k], rng), jpeg))
+        shots.append((cut, _slightly_turned(pose, rng), jpeg))
     return shots
 
 

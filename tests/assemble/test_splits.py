@@ -1,21 +1,28 @@
 """Seams between boards that were seen as one: pieces, segments, contacts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from shapely.geometry import box
 
 from clouds import sheet
 from kerfwright.assemble.discontinuity import Discontinuity
+from kerfwright.assemble.face_seams import _crosses_all, _partner, beside_face
 from kerfwright.assemble.splits import (
     SeamLine,
-    _crosses_all,
+    _apart,
     _is_clear,
     _is_denied,
-    _partner,
+    _is_late_wood,
+    _on_line,
+    _wide_enough,
     seam_contact,
     seam_segments,
     split_sheet,
 )
+from kerfwright.assemble.texture import FaceStrips
+from kerfwright.assemble.tone import ToneSteps
 
 ACROSS = np.array([1.0, 0.0])
 WIDE = sheet("wide", np.eye(4), 20.0, (0, 0, 300, 100), top_idx=np.arange(6))
@@ -73,7 +80,7 @@ def changing(strength: float, views: int, at: float = 100.0) -> Discontinuity:
     offsets = np.arange(0.0, 300.0)
     values = np.where(np.abs(offsets - at) < 2, strength, 1.0)
     none = np.zeros((300, 8, 1))
-    return Discontinuity(offsets, values, none[:, 0], none, np.zeros((views, *none.shape)))
+    return Discontinuity(offsets, values, none[:, 0], none, np.zeros((views, 300, 8, 3)), np.zeros((9, 1)))
 
 
 @pytest.mark.parametrize(("other", "denied"), [
@@ -88,3 +95,53 @@ def test_a_seam_goes_through_to_the_other_face(other, denied):
 def test_few_views_need_a_stronger_seam(strength, views, clear):
     line = SeamLine(ACROSS, 100.0, np.zeros(2), np.array([0.0, 100.0]), strength, views)
     assert _is_clear(line) is clear
+
+
+def stepping(strength: float, side: float, views: int = 6) -> ToneSteps:
+    """A face whose tone steps to one side at 100 mm, as `views` photographs show it."""
+    offsets = np.arange(0.0, 300.0)
+    values = np.where(np.abs(offsets - 100) < 2, strength, 0.5)
+    line = side * np.ones((300, 3))
+    return ToneSteps(offsets, values, line, line, [], line, np.zeros((views, 300, 8, 3)))
+
+
+def test_boards_step_to_the_same_side_on_both_faces():
+    assert not _is_denied(seam(100), stepping(8, 1.0), stepping(8, 1.0), 500.0)
+    assert _is_denied(seam(100), stepping(8, 1.0), stepping(8, -1.0), 500.0)
+    assert _is_denied(seam(100), stepping(8, 1.0), stepping(8, 0.2), 500.0)
+
+
+def test_a_strong_line_that_wanders_denies_a_step_of_tone():
+    broken = replace(changing(9.0, 6), line=np.ones((300, 1)))  # no eighth of it shows anything
+    assert _is_late_wood(seam(100), broken, 500.0)
+    assert not _is_late_wood(seam(150), broken, 500.0)
+    assert not _is_late_wood(seam(100), changing(6.0, 6), 500.0)
+    assert not _is_late_wood(seam(100), replace(broken, flat=np.ones((300, 8, 1))), 500.0)
+
+
+def test_a_step_of_tone_lies_where_a_line_near_by_does():
+    assert _on_line(seam(100), [seam(103), seam(160)], 500.0).offset == 103
+    assert _on_line(seam(100), [seam(110)], 500.0).offset == 100
+
+
+def test_nothing_is_measured_across_a_known_seam():
+    strips = FaceStrips(np.arange(300.0), np.arange(8.0), np.zeros((2, 300, 8, 3)))
+    told = np.isfinite(_apart(strips, [seam(100)]).colours[..., 0]).all(axis=(0, 2))
+    assert not told[98:103].any()
+    assert told[:98].all()
+    assert told[103:].all()
+    assert np.isfinite(strips.colours).all()
+
+
+def test_a_doubtful_seam_leaves_no_narrow_strip():
+    offsets = [s.offset for s in _wide_enough(WIDE, ACROSS, [seam(100), seam(200), seam(280)])]
+    assert offsets == [100, 200]
+    certain = SeamLine(ACROSS, 280.0, np.array([280.0, 0]), np.array([280.0, 100]), 20.0, 6)
+    assert len(_wide_enough(WIDE, ACROSS, [seam(100), seam(200), certain])) == 3
+
+
+def test_a_board_underneath_is_not_seen_from_above():
+    under = sheet("under", np.eye(4)[[0, 2, 1, 3]] * [[1], [-1], [1], [1]], 18.0, (0, -80, 300, 0))
+    through = sheet("through", np.eye(4)[[0, 2, 1, 3]] * [[1], [-1], [1], [1]], 18.0, (0, -80, 300, 90))
+    assert beside_face(WIDE, [under, through], "top") == [through]
+    assert beside_face(WIDE, [under, through], "bottom") == [under, through]

@@ -42,7 +42,8 @@ class Discontinuity:
     strength: np.ndarray  # (U,)
     line: np.ndarray  # (U, F) the change itself, whitened
     flat: np.ndarray  # (U, C, F) of every strip
-    single: np.ndarray  # (V, U, C, F) of every view
+    colours: np.ndarray  # (V, U, C, 3) of every view
+    white: np.ndarray  # (3 colours of every filter, F)
 
     sharp: bool = True  # lines, by whose distance a gap is known
     denied: float = 2.0  # strength on the other face, below which no joint goes through
@@ -50,7 +51,11 @@ class Discontinuity:
     @property
     def shown(self) -> int:
         """How many views there are."""
-        return len(self.single)
+        return len(self.colours)
+
+    def like(self, _other: Discontinuity, _k: int) -> np.ndarray:
+        """(U,) True: on both faces a joint is a line, but not the same one, as wear and light differ."""
+        return np.ones(len(self.offsets), bool)
 
     def along(self, k: int) -> float:
         """Least share of the change at offset k that any third of the line shows."""
@@ -70,8 +75,10 @@ class Discontinuity:
 
     def views(self, k: int) -> list[float]:
         """Share of the change at offset k that each view shows; views that do not show the offset are left out."""
-        shown = [own[k] for own in self.single if np.isfinite(own[k, :, 0]).mean() >= LEAST_STRIPS]
-        return [_share(own, self.line[k]) for own in shown]
+        low = max(0, k - REACH)
+        near = self.colours[:, low : k + REACH + 1]
+        single = [_filtered(own)[k - low] @ self.white for own in near]
+        return [_share(own, self.line[k]) for own in single if np.isfinite(own[:, 0]).mean() >= LEAST_STRIPS]
 
 
 def discontinuity(strips: FaceStrips) -> Discontinuity | None:
@@ -92,7 +99,7 @@ def discontinuity(strips: FaceStrips) -> Discontinuity | None:
     usual = 1.4826 * np.median(np.abs(line[good]), axis=0)
     usual = np.hypot(usual, FAINTEST * np.linalg.norm(white, axis=0))
     strength[good] = gaussian_filter1d(((line[good] / usual) ** 2).mean(axis=1), BLUR)
-    return Discontinuity(strips.offsets, strength, line, flat, np.array([_filtered(own) @ white for own in colours]))
+    return Discontinuity(strips.offsets, strength, line, flat, colours, white)
 
 
 def mean_of_views(colours: np.ndarray) -> np.ndarray:

@@ -12,11 +12,20 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from shapely.geometry import LineString, Polygon
+from shapely.geometry import Polygon
 
 from kerfwright.assemble.discontinuity import Discontinuity, discontinuity
+from kerfwright.assemble.face_seams import (
+    LEAST_VIEWS,
+    NARROWEST,
+    SEPARATE,
+    Change,
+    SeamLine,
+    beside_face,
+    seams_of_face,
+)
 from kerfwright.assemble.texture import FaceStrips, face_strips
-from kerfwright.assemble.tone import ToneSteps, runs_along_grain, tone_steps
+from kerfwright.assemble.tone import runs_along_grain, tone_steps
 from kerfwright.assemble.types import ConstraintSegment
 from kerfwright.identify.photo_edges import Photos
 from kerfwright.identify.types import Sheet
@@ -26,37 +35,16 @@ from kerfwright.model import Contact, ContactEvidence
 __all__ = ["SeamLine", "SeamSearch", "find_seam_lines", "seam_contact", "seam_segments", "split_sheet"]
 
 LEAST_STRENGTH = 7.0  # of a board's best seam, against the usual change across lines of its face
+LEAST_TONE = 5.5  # ... told by tone: within 30 made single boards (seeds from 1000) 3.4 at most, in the captures' 4.6
 LENT_STRENGTH = 4.0  # of further ones: where two boards were glued, more may have been
-LENT_TONE = 1.9  # ... told by tone: steps within made single boards (seeds from 1000) had 1.7 at most
-LEAST_ALONG = 0.5  # share of the change that every third of the line must show
-LINE_ALONG = 0.6  # ... where no geometry expects a line: a year ring all along a made single board had .55
-LEAST_VIEWS = 4
+LINE_ALONG = 0.6  # share of a line's change in every third, where no geometry expects one: a year ring all along a made
+# single board had .55
 CERTAIN = 2.0  # times LEAST_STRENGTH; steep grain that passed for a seam in four views had up to 1.13
 THROUGH = 1 / 150  # of D, between a seam's places on both faces
-LEAST_AGREEMENT = 0.75  # mean share of the change that a single view shows
-EASED = 1 / 40  # of D; eased edges of two boards lie no further apart
-GAP_SHARE = 0.5  # of the way between two such lines: the rest is rounding; it cannot be told apart from above
-PARTNER = 0.7  # strength of the weaker line of the two
-NARROWEST = 1 / 16  # of D; narrower strips are shadows and edges more often than boards
-SEPARATE = 2 / 3  # of it, within which one joint is looked for
 TOGETHER = 1 / 100  # of D, within which a line and a step of tone are the same joint's
-KNOWN = 1 / 40  # of D, round lines in which other boards meet this one
-
-Change = Discontinuity | ToneSteps
-
-
-@dataclass(frozen=True, eq=False)
-class SeamLine:
-    """The line m.xy = offset across a board, board frame mm, from start to end."""
-
-    m: np.ndarray
-    offset: float
-    start: np.ndarray
-    end: np.ndarray
-    strength: float
-    views: int
-    gap: float = 0.0  # mm between the two boards, where their eased edges show as two lines
-    along: float = 1.0  # least share of the change that a third of the line shows
+MOST_ROUNDS = 4  # of a search for further seams once some are known
+STRIP_SHARE = 1 / 3  # of the usual width of the boards; boards of a panel are of like widths
+CUT = 2  # samples to either side of a known seam that belong to neither board
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,16 +63,29 @@ class SeamSearch:
         least : strength of a seam where one is expected; 0 asks for one that is clear by itself.
         """
         strips = [_strips(self, m, face) for face in ("top", "bottom")]
-        lines = _on_either_face(self, m, [s and discontinuity(s) for s in strips], least or LENT_STRENGTH)
         if least:
-            return lines
+            return _on_either_face(self, m, [s and discontinuity(s) for s in strips], least)
+        seams = self._unexpected(m, strips)
+        if not any(_is_clear(s) for s in seams):
+            return []
+        for _ in range(MOST_ROUNDS):
+            more = self._unexpected(m, [s and _apart(s, seams) for s in strips])
+            if not more:
+                break
+            seams += more
+        return _wide_enough(self.sheet, m, seams)
+
+    def _unexpected(self, m: np.ndarray, strips: list[FaceStrips | None]) -> list[SeamLine]:
+        """Seams square to m that lines and steps of tone tell of, where no geometry expects one."""
+        changes = [s and discontinuity(s) for s in strips]
         steps = [s and tone_steps(s) for s in strips]
         along = [s is not None and runs_along_grain(s) for s in strips]
-        tones = _on_either_face(self, m, [t if a else None for t, a in zip(steps, along, strict=True)], LENT_TONE)
+        tones = _on_either_face(self, m, [t if a else None for t, a in zip(steps, along, strict=True)], LENT_STRENGTH)
+        tones = [t for t in tones if not any(c and _is_late_wood(t, c, self.diameter) for c in changes)]
         shaded = [t for t, a in zip(steps, along, strict=True) if t is not None and not a]
-        lines = [s for s in lines if s.along > LINE_ALONG and not any(t.slopes(s.offset) for t in shaded)]
-        seams = _merged(lines, tones, self.diameter)
-        return seams if any(_is_clear(s) for s in seams) else []
+        lines = _on_either_face(self, m, changes, LENT_STRENGTH)
+        unshaded = [s for s in lines if s.along > LINE_ALONG and not any(t.slopes(s.offset) for t in shaded)]
+        return _merged(unshaded, [_on_line(t, lines, self.diameter) for t in tones], self.diameter)
 
 
 def _strongest(seams: list[SeamLine]) -> float:
@@ -109,15 +110,56 @@ def _strips(search: SeamSearch, m: np.ndarray, face: str) -> FaceStrips | None:
     return strips if strips is not None and len(strips.colours) >= LEAST_VIEWS else None
 
 
+def _apart(strips: FaceStrips, seams: list[SeamLine]) -> FaceStrips:
+    """The strips as those of several boards: nothing is measured across a known seam, so that what is usual within a
+    board is known better than from a face that holds seams.
+    """
+    colours = strips.colours.copy()
+    for seam in seams:
+        k = int(np.abs(strips.offsets - seam.offset).argmin())
+        colours[:, max(0, k - CUT) : k + CUT + 1] = np.nan
+    return replace(strips, colours=colours)
+
+
+def _is_late_wood(seam: SeamLine, lines: Discontinuity, diameter: float) -> bool:
+    """Whether a step of tone is the border of a band of late wood: its line is the clearer of the two, and wanders."""
+    strength = np.where(np.abs(lines.offsets - seam.offset) < TOGETHER * diameter, np.nan_to_num(lines.strength), 0.0)
+    k = int(strength.argmax())
+    if strength[k] < max(LEAST_STRENGTH, seam.strength):
+        return False
+    return lines.along(k) < LINE_ALONG or not lines.unbroken(k)
+
+
 def _on_either_face(
     search: SeamSearch, m: np.ndarray, faces: list[Change | None], least: float
 ) -> list[SeamLine]:
     """Seams of the face that shows the strongest one, all that the other face does not deny."""
     found = []
-    for own, other in (faces, faces[::-1]):
-        seams = [] if own is None else _seams_across(search.sheet, m, own, search.touching, search.diameter, least)
+    for face, own, other in zip(("top", "bottom"), faces, faces[::-1], strict=True):
+        if own is None:
+            continue
+        beside = beside_face(search.sheet, search.touching, face)
+        seams = seams_of_face(search.sheet, m, own, beside, search.diameter, least)
         found.append([s for s in seams if not _is_denied(s, own, other, search.diameter)])
-    return max(found, key=_strongest)
+    return max(found, key=_strongest, default=[])
+
+
+def _wide_enough(sheet: Sheet, m: np.ndarray, seams: list[SeamLine]) -> list[SeamLine]:
+    """Seams without those, not certain by themselves, that leave a strip much narrower than the other boards."""
+    across, seams = np.asarray(sheet.region.exterior.coords)[:, :2] @ m, sorted(seams, key=lambda s: s.offset)
+    for seam in sorted(seams, key=lambda s: s.strength):
+        widths = np.diff([across.min(), *(s.offset for s in seams), across.max()])
+        k = seams.index(seam)
+        if seam.strength < CERTAIN * LEAST_STRENGTH and min(widths[k : k + 2]) < STRIP_SHARE * np.median(widths):
+            seams.remove(seam)
+    return seams
+
+
+def _on_line(seam: SeamLine, lines: list[SeamLine], diameter: float) -> SeamLine:
+    """A step of tone, moved to the line that shows where it is, however faint: wood is of one tone up to its rim."""
+    near = [line for line in lines if abs(line.offset - seam.offset) < TOGETHER * diameter]
+    best = max(near, key=lambda line: line.strength, default=seam)
+    return replace(seam, offset=best.offset, start=best.start, end=best.end, gap=best.gap)
 
 
 def _merged(lines: list[SeamLine], tones: list[SeamLine], diameter: float) -> list[SeamLine]:
@@ -129,7 +171,7 @@ def _merged(lines: list[SeamLine], tones: list[SeamLine], diameter: float) -> li
         if any(t.strength > seam.strength for t in rivals):
             continue
         best = max([seam, *same], key=lambda s: s.strength)
-        out.append(replace(seam, strength=best.strength, views=best.views))
+        out.append(replace(seam, strength=best.strength, views=best.views, by_tone=best.by_tone))
         tones = [t for t in tones if t not in same and t not in rivals]
     return out + tones
 
@@ -139,110 +181,15 @@ def _is_denied(seam: SeamLine, own: Change, other: Change | None, diameter: floa
     if other is None or other.shown < own.shown:
         return False
     near = np.abs(other.offsets - seam.offset) < THROUGH * diameter
-    told = other.strength[near & np.isfinite(other.strength)]
-    return bool(len(told) and told.max() < other.denied)
-
-
-def _seams_across(
-    sheet: Sheet, m: np.ndarray, change: Change, touching: list[Sheet], diameter: float, least: float
-) -> list[SeamLine]:
-    """Seams of one face that are stronger than `least`."""
-    ring = np.asarray(sheet.region.exterior.coords)[:, :2]
-    margin = NARROWEST * diameter
-    known = _known_lines(sheet, m, touching)
-    places = _seam_places(change, ring @ m, margin, least)
-    seams = [_seam(change, k, m, ring, diameter) for k in places]
-    return [
-        s for s in seams
-        if all(abs(s.offset - other) > KNOWN * diameter for other in known)
-        and _crosses_all(sheet.region, m, s.offset, margin / 4)
-    ]
+    told = np.isfinite(other.strength) & near
+    alike = other.like(own, int(np.abs(own.offsets - seam.offset).argmin()))
+    return bool(told.any() and not (other.strength[told & alike] > other.denied).any())
 
 
 def _is_clear(seam: SeamLine) -> bool:
     """Whether a seam counts by itself: one that just passes must show in more than the least views."""
-    return seam.strength > LEAST_STRENGTH and (seam.views > LEAST_VIEWS or seam.strength > CERTAIN * LEAST_STRENGTH)
-
-
-def _seam_places(change: Change, across: np.ndarray, margin: float, least: float) -> list[int]:
-    """Offsets whose change is strong, runs along the whole line, shows in the views, and is the strongest near by."""
-    strength = np.nan_to_num(change.strength)
-    inner = (change.offsets > across.min() + margin) & (change.offsets < across.max() - margin)
-    reach = round(margin / (change.offsets[1] - change.offsets[0]) * SEPARATE)
-    peaks = [
-        int(k) for k in np.flatnonzero(inner & (strength > least))
-        if strength[k] == strength[max(0, k - reach) : k + reach + 1].max()
-    ]
-    return [k for k in peaks if change.along(k) >= LEAST_ALONG and change.unbroken(k) and _agreed(change.views(k))]
-
-
-def _agreed(shares: list[float]) -> bool:
-    """Whether the views show the change: several each for itself, and all on the mean. A glint shows in one."""
-    return _showing(shares) >= LEAST_VIEWS and float(np.mean(shares)) >= LEAST_AGREEMENT
-
-
-def _showing(shares: list[float]) -> int:
-    return sum(share > LEAST_ALONG for share in shares)
-
-
-def _seam(change: Change, k: int, m: np.ndarray, ring: np.ndarray, diameter: float) -> SeamLine:
-    """The seam at a peak: its middle, ends on the outline's box, and the gap where eased edges show as two lines."""
-    along, strength = ring @ np.array([-m[1], m[0]]), np.nan_to_num(change.strength)
-    step = float(change.offsets[1] - change.offsets[0])
-    apart = step * _partner(strength, k, EASED * diameter / step) if change.sharp else 0.0
-    at = change.located(k) + apart / 2
-    start, end = at * m + np.array([[along.min()], [along.max()]]) * np.array([-m[1], m[0]])
-    told, gap = (float(strength[k]), _showing(change.views(k))), abs(apart) * GAP_SHARE
-    return SeamLine(m, at, start, end, *told, gap, change.along(k))
-
-
-def _partner(strength: np.ndarray, k: int, reach: float) -> float:
-    """Steps from a peak to the second line of the same joint, 0 where there is none: eased edges show as two lines."""
-    low, high = max(1, int(k - reach)), min(len(strength) - 1, int(k + reach) + 1)
-    partners = [
-        j for j in range(low, high)
-        if j != k and strength[j] > PARTNER * strength[k] and strength[j] >= max(strength[j - 1], strength[j + 1])
-    ]
-    return float(max(partners, key=lambda j: strength[j]) - k) if partners else 0.0
-
-
-def _known_lines(sheet: Sheet, m: np.ndarray, touching: list[Sheet]) -> list[float]:
-    """Offsets of the lines in which the sheet planes and the ends of touching boards meet this board."""
-    lines = []
-    for other in touching:
-        lines += _ends_on(sheet, m, other)
-        n = other.normal @ sheet.world_from_board[:3, :3]
-        flat = float(np.hypot(n[0], n[1]))
-        if flat < 0.2 or abs(n[:2] @ m) < 0.98 * flat:
-            continue
-        base = other.normal @ (other.world_from_board[:3, 3] - sheet.world_from_board[:3, 3])
-        sign = np.sign(n[:2] @ m)
-        for plane in (0.0, other.thickness.value):
-            lines += [sign * (base + plane - n[2] * z) / flat for z in (0.0, sheet.thickness.value)]
-    return lines
-
-
-def _ends_on(sheet: Sheet, m: np.ndarray, other: Sheet) -> list[float]:
-    """Between which two offsets another board's end lies on this one."""
-    ring = np.asarray(other.region.exterior.coords)[:, :2]
-    corners = np.concatenate([np.c_[ring, np.full(len(ring), z)] for z in (0.0, other.thickness.value)])
-    x = sheet.to_board(other.to_world(corners))
-    reach = sheet.thickness.value / 2
-    across = x[(x[:, 2] > -reach) & (x[:, 2] < sheet.thickness.value + reach), :2] @ m
-    return [float(across.min()), float(across.max())] if len(across) else []
-
-
-def _crosses_all(region: Polygon, m: np.ndarray, offset: float, reach: float) -> bool:
-    """Whether lines a little before and after the seam run through one stretch of wood: not past a hole or a bay. The
-    seam itself may be an open slit.
-    """
-    tangent = np.array([-m[1], m[0]])
-    for shift in (-reach, reach):
-        middle = (offset + shift) * m
-        chord = region.intersection(LineString([middle - 1e5 * tangent, middle + 1e5 * tangent]))
-        if chord.geom_type != "LineString" or chord.is_empty:
-            return False
-    return True
+    least = LEAST_TONE if seam.by_tone else LEAST_STRENGTH
+    return seam.strength > least and (seam.views > LEAST_VIEWS or seam.strength > CERTAIN * LEAST_STRENGTH)
 
 
 def split_sheet(sheet: Sheet, seams: list[SeamLine], points: np.ndarray) -> list[Sheet]:

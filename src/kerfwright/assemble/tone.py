@@ -33,6 +33,7 @@ __all__ = ["ToneSteps", "runs_along_grain", "tone_steps"]
 WINDOWS = ((3, 8), (4, 16), (4, 30))
 SUDDEN = ((0.55, 1.6), (0.75, 1.6))  # of the broadest window's step that the others show; an even slope has 0.38 and
 # 0.64, a dark line more than all
+STEEP = 0.9  # of the second window: no slope, whatever a single ring in the narrowest does
 BEYOND = (30, 26)  # samples: the narrowest board is hardly wider than both, and has one tone so far
 LASTS = (0.45, 1.7)  # of the step, that must be there still; less is a band of late wood, an even slope has 2.2
 NEAR = 8  # samples from the strongest place to the best one, and from there to what counts for its middle
@@ -43,9 +44,9 @@ CLIP = 2.5  # robust deviations of stretches: a knot does not set the measure
 USUAL = 0.7  # share of the offsets that set the measure; at others may be seams or shadows
 ROUNDS = 8
 CHI2_MEDIAN = 2.366  # of three degrees of freedom
-SCALE = 7 / 50  # to the strengths of `discontinuity`; 30 made single boards (seeds from 1000) had 1.7 at most, a wide
-# band of late wood on a bookshelf's side 4.8
-SHADED = 2.0  # strength of a step of light worth asking whether it slopes
+SCALE = 7 / 23  # to the strengths of `discontinuity`; 30 made single boards (seeds from 1000) had 3.4 at most
+SHADED = 4.3  # strength of a step of light worth asking whether it slopes
+HALF = 0.5  # of a step: the other face of the same boards shows it, too
 LEAST_EIGHTHS = 7  # that must step to the same side
 
 
@@ -62,7 +63,7 @@ class ToneSteps:
     colours: np.ndarray  # (V, U, C, 3) of every view
 
     sharp: bool = False
-    denied: float = 0.8  # strength on the other face, below which no joint goes through
+    denied: float = 1.7  # strength on the other face, below which no joint goes through
 
     @property
     def shown(self) -> int:
@@ -72,6 +73,10 @@ class ToneSteps:
     def along(self, k: int) -> float:
         """Least share of the step at offset k that any third of the line shows."""
         return min(self._share(part, k) for part in np.array_split(self.flats[-1][k], THIRDS))
+
+    def like(self, other: ToneSteps, k: int) -> np.ndarray:
+        """(U,) where this face steps to the same side as another one does at its offset k, by half as much or more."""
+        return self.line @ other.weight[k] > HALF * (other.line[k] @ other.weight[k])
 
     def unbroken(self, k: int) -> bool:
         """Whether all eighths of the line but one step to the same side at offset k, suddenly, as shadows do not, and
@@ -90,7 +95,8 @@ class ToneSteps:
         return bool(self.strength[k] > SHADED) and self._slopes_at(k)
 
     def _slopes_at(self, k: int) -> bool:
-        return any(share < low for share, (low, _) in zip(self._narrow(k), SUDDEN, strict=True))
+        narrowest, narrow = self._narrow(k)
+        return narrow < SUDDEN[1][0] or (narrowest < SUDDEN[0][0] and narrow < STEEP)
 
     def _narrow(self, k: int) -> list[float]:
         """Shares of the broadest window's step that the narrower windows show."""
