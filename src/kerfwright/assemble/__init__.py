@@ -27,6 +27,7 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     """
     from kerfwright.assemble.contacts import to_contact
     from kerfwright.assemble.depths import remeasured
+    from kerfwright.assemble.inferred import told
     from kerfwright.assemble.laid import laid_contacts
     from kerfwright.assemble.veils import still_open, unveiled
     from kerfwright.identify.align import align_sheets
@@ -44,11 +45,13 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
         sheets, edges = remeasured(sheets, capture.cloud, photos, parts.noise), tuple(() for _ in sheets)
     sheets = _with_hidden_faces(sheets, capture.cloud, photos, free, options)
     sheets, decided, segments, findings = _met(sheets, parts.ends, capture.cloud, photos, free, options)
+    sheets, decided, segments = _held(sheets, decided, segments, capture.cloud, photos, free, options)
     if options.stock.sizes:
         sheets, decided, segments = _snapped(sheets, decided, capture.cloud, free, parts.noise, options)
     laid = laid_contacts(sheets, options.min_contact * diameter)
     contacts = (*(to_contact(d, sheets) for d in decided), *laid)
     edges = still_open(edges, segments)
+    findings = (*findings, *told(contacts))
     return Assembly(sheets, contacts, tuple(a + b for a, b in zip(segments, edges, strict=True)), findings)
 
 
@@ -67,6 +70,25 @@ def _with_hidden_faces(
     sheets = backed_by_ends(mended(sheets, cloud, free, options), cloud.diameter, options)
     sheets = flush_neighbours(share_thickness(sheets, cloud.diameter, options), cloud.diameter, options)
     return laid_on(sheets, cloud, free, options)
+
+
+def _held(
+    sheets: tuple[Sheet, ...], decided: list[Decided], segments: tuple[tuple[ConstraintSegment, ...], ...],
+    cloud: Cloud, photos: Photos, free: FreeSpace, options: AssembleOptions,
+) -> tuple[tuple[Sheet, ...], list[Decided], tuple[tuple[ConstraintSegment, ...], ...]]:
+    """The boards with those that nothing holds joined to the others, where nothing contradicts it."""
+    from kerfwright.assemble.constraints import constraint_segments
+    from kerfwright.assemble.inferred import joined_up, marked
+    from kerfwright.identify.reaching import Scene
+    from kerfwright.identify.visibility import Obstacles
+
+    obstacles = Obstacles(sheets, options.outline_error * cloud.diameter)
+    held, joined = joined_up(Scene(sheets, cloud, photos, obstacles, free, options), decided)
+    joined = marked(joined, held, cloud.diameter)
+    if all(one is other for one, other in zip(held, sheets, strict=True)):
+        return sheets, joined, segments
+    segments = constraint_segments(held, joined, cloud.diameter, options)
+    return _run_on(held, segments, options.far_reach * cloud.diameter), joined, segments
 
 
 def _snapped(

@@ -21,7 +21,7 @@ from kerfwright.identify.reaching import LEAST_VIEWS, Scene, end_is_seen, goes_o
 from kerfwright.identify.seams import Seam, look_for_seam
 from kerfwright.identify.types import Sheet
 from kerfwright.identify.visibility import Obstacles
-from kerfwright.model import Contact, ContactEvidence
+from kerfwright.model import Contact, ContactEvidence, Origin
 
 __all__ = ["find_contacts", "to_contact"]
 
@@ -250,6 +250,7 @@ def to_contact(decided: Decided, sheets: tuple[Sheet, ...]) -> Contact:
         point=_point(normal * offset), normal=_point(normal), interface=polygons,
         area=joint.length * b.thickness.value / joint.trace.sine, angle=angle,
         bevelled=abs(joint.trace.slope) > 1e-3, evidence=decided.evidence,
+        origin=Origin.INFERRED if decided.evidence.decided_by == "inferred" else Origin.MEASURED,
     )
 
 

@@ -8,8 +8,8 @@ from shapely.geometry.polygon import orient
 
 from kerfwright.identify.joints import face_plane
 from kerfwright.identify.laid import Pair, facing_pairs
-from kerfwright.identify.types import Sheet
-from kerfwright.model import Contact, ContactEvidence
+from kerfwright.identify.types import INFERRED_FACES, Sheet
+from kerfwright.model import Contact, ContactEvidence, Origin
 
 __all__ = ["laid_contacts"]
 
@@ -26,10 +26,13 @@ def _contact(pair: Pair, sheets: tuple[Sheet, ...]) -> Contact:
     normal, offset = face_plane(a, pair.face_a)
     level = a.thickness.value if pair.face_a == "top" else 0.0
     pieces = [p for p in getattr(pair.overlap, "geoms", [pair.overlap]) if p.geom_type == "Polygon"]
+    inferred = INFERRED_FACES[pair.face_a] in a.inferred or INFERRED_FACES[pair.face_b] in b.inferred
     return Contact(
         type=3, a=a.name, b=b.name, face_a=pair.face_a, face_b=pair.face_b, point=_point(normal * offset),
         normal=_point(normal), interface=tuple(_polygon(p, a, level, pair.face_a) for p in pieces),
-        area=float(pair.overlap.area), angle=0.0, evidence=ContactEvidence(),
+        area=float(pair.overlap.area), angle=0.0,
+        evidence=ContactEvidence(decided_by="inferred" if inferred else "geometry"),
+        origin=Origin.INFERRED if inferred else Origin.MEASURED,
     )
 
 

@@ -20,7 +20,7 @@ from kerfwright.identify.options import WholeOptions
 from kerfwright.identify.types import Sheet
 from kerfwright.model import Origin
 
-__all__ = ["Pair", "facing_pairs", "laid_on"]
+__all__ = ["Pair", "facing_pairs", "is_seen_through", "laid_on", "put_on_plane", "share_seen"]
 
 PARALLEL = 1 - 1e-9  # cosine: one class of the alignment
 SEEN = 0.25  # share of the overlap that must show points of a face for it to count as seen
@@ -55,7 +55,7 @@ def laid_on(
     links = []
     for pair in facing_pairs(sheets, options.min_contact * cloud.diameter):
         link = _link(pair, sheets, cloud, options)
-        if link is not None and not _is_free(pair, sheets, free):
+        if link is not None and not is_seen_through(pair, sheets, free):
             links.append(link)
     for group in _groups(links):
         sheets = _on_one_plane(sheets, group, options.flush * cloud.diameter)
@@ -89,7 +89,7 @@ def _on_one_plane(sheets: tuple[Sheet, ...], group: list[_Link], furthest: float
             frame[:3, 3] += (level - offset) * normal
             moved[k] = replace(moved[k], world_from_board=frame)
     for k, face in sorted(hidden):
-        moved[k] = _reached(moved[k], face, normal, level)
+        moved[k] = put_on_plane(moved[k], face, normal, level)
     return tuple(moved)
 
 
@@ -99,30 +99,34 @@ def _offset(sheet: Sheet, face: str, normal: np.ndarray) -> float:
     return offset if own @ normal > 0 else -offset
 
 
-def facing_pairs(sheets: tuple[Sheet, ...], shortest: float) -> list[Pair]:
-    """Pairs of faces that look at each other closely and overlap by at least `shortest` mm squared."""
+def facing_pairs(sheets: tuple[Sheet, ...], shortest: float, furthest: float = 0.0) -> list[Pair]:
+    """Pairs of faces that look at each other, no further apart than the thinner board is thick or `furthest` mm, and
+    overlap by at least `shortest` mm squared.
+    """
     found = []
     for a in range(len(sheets)):
         for b in range(len(sheets)):
             if a == b or abs(sheets[a].normal @ sheets[b].normal) < PARALLEL:
                 continue
             face_b = "bottom" if sheets[a].normal @ sheets[b].normal > 0 else "top"
-            pair = _pair(sheets, a, b, "top", face_b, shortest)
+            pair = _pair(sheets, a, b, "top", face_b, shortest, furthest)
             if pair is not None and (face_b == "bottom" or a < b):
                 found.append(pair)
             if face_b == "top" and a < b:
-                pair = _pair(sheets, a, b, "bottom", "bottom", shortest)
+                pair = _pair(sheets, a, b, "bottom", "bottom", shortest, furthest)
                 found += [pair] if pair is not None else []
     return found
 
 
-def _pair(sheets: tuple[Sheet, ...], a: int, b: int, face_a: str, face_b: str, shortest: float) -> Pair | None:
+def _pair(
+    sheets: tuple[Sheet, ...], a: int, b: int, face_a: str, face_b: str, shortest: float, furthest: float
+) -> Pair | None:
     """The two faces, if they look at each other closely and overlap."""
     one, other = sheets[a], sheets[b]
     offset = face_plane(one, face_a)[1]
     gap = float(-face_plane(other, face_b)[1]) - offset
     thinner = min(one.thickness.value, other.thickness.value)
-    if not -DEEPEST * thinner < gap < thinner:
+    if not -DEEPEST * thinner < gap < max(thinner, furthest):
         return None
     overlap = one.region.intersection(moved_region(other, one))
     return Pair(a, b, face_a, face_b, gap, overlap) if overlap.area > shortest**2 else None
@@ -131,7 +135,7 @@ def _pair(sheets: tuple[Sheet, ...], a: int, b: int, face_a: str, face_b: str, s
 def _link(pair: Pair, sheets: tuple[Sheet, ...], cloud: Cloud, options: WholeOptions) -> _Link | None:
     """Which board's face is put where the other's is: the one nobody sees; None where both are seen apart."""
     faces = ((pair.a, pair.face_a), (pair.b, pair.face_b))
-    seen = [_seen(sheets[k], face, pair, sheets[pair.a], cloud, options) for k, face in faces]
+    seen = [share_seen(sheets[k], face, pair, sheets[pair.a], cloud, options) for k, face in faces]
     if min(seen) > SEEN:
         return None
     areas = [sheets[k].region.area for k, _ in faces]
@@ -139,7 +143,7 @@ def _link(pair: Pair, sheets: tuple[Sheet, ...], cloud: Cloud, options: WholeOpt
     return _Link(*(faces if first else faces[::-1]))
 
 
-def _seen(sheet: Sheet, face: str, pair: Pair, frame: Sheet, cloud: Cloud, options: WholeOptions) -> float:
+def share_seen(sheet: Sheet, face: str, pair: Pair, frame: Sheet, cloud: Cloud, options: WholeOptions) -> float:
     """Share of the overlap that shows points of the face."""
     idx = sheet.top_idx if face == "top" else sheet.bottom_idx
     xy = frame.to_board(cloud.points[idx])[:, :2]
@@ -152,7 +156,7 @@ def _seen(sheet: Sheet, face: str, pair: Pair, frame: Sheet, cloud: Cloud, optio
     return float(min(cells * cell**2 / inner.area, 1.0))
 
 
-def _is_free(pair: Pair, sheets: tuple[Sheet, ...], free: FreeSpace) -> bool:
+def is_seen_through(pair: Pair, sheets: tuple[Sheet, ...], free: FreeSpace) -> bool:
     """Whether cameras saw through the gap between the faces."""
     frame = sheets[pair.a]
     level = frame.thickness.value + pair.gap / 2 if pair.face_a == "top" else -pair.gap / 2
@@ -166,7 +170,7 @@ def _is_free(pair: Pair, sheets: tuple[Sheet, ...], free: FreeSpace) -> bool:
     return float((free.votes(places) >= 2).mean()) > FREE
 
 
-def _reached(sheet: Sheet, face: str, normal: np.ndarray, offset: float) -> Sheet:
+def put_on_plane(sheet: Sheet, face: str, normal: np.ndarray, offset: float) -> Sheet:
     """The sheet as thick as it must be for a face of it to lie on a plane; its other face stays."""
     place = sheet.to_board((normal * offset)[None])[0, 2]
     thickness = place if face == "top" else sheet.thickness.value - place

@@ -22,7 +22,7 @@ from kerfwright.identify.seams import End, look_for_end
 from kerfwright.identify.types import Sheet
 from kerfwright.identify.visibility import Obstacles
 
-__all__ = ["LEAST_VIEWS", "Scene", "end_is_seen", "goes_on_unseen", "shown_end"]
+__all__ = ["LEAST_VIEWS", "Scene", "end_is_seen", "goes_on_unseen", "may_reach", "shown_end"]
 
 AS_CLEAR = 0.8  # of the score of the edge at the plane
 LEAST_VIEWS = 3  # photographs that must show an edge for it to decide anything
@@ -78,12 +78,19 @@ def goes_on_unseen(scene: Scene, joint: Joint | None) -> Joint | None:
     options = scene.options
     if joint is None or joint.gap > scene.mm(options.unseen_reach) or joint.length < scene.mm(options.reach):
         return None
+    return joint if may_reach(scene, joint) else None
+
+
+def may_reach(scene: Scene, joint: Joint) -> bool:
+    """Whether nothing contradicts that a joint's board goes on to the plane: it was not seen to end before, nobody saw
+    through the gap, no other board fills it, and the photographs show an edge at the plane, or nothing.
+    """
     if end_is_seen(scene, joint) or _gap_is_free(scene, joint) or _gap_is_taken(scene, joint):
-        return None
+        return False
     end = _end(scene, joint)
     if end is None or end.views < LEAST_VIEWS:
-        return joint
-    return None if end.excess < options.end_excess / 2 or _ends_before(scene, joint, end) else joint
+        return True
+    return not (end.excess < scene.options.end_excess / 2 or _ends_before(scene, joint, end))
 
 
 def _gap_is_free(scene: Scene, joint: Joint) -> bool:

@@ -9,7 +9,9 @@ from shapely.geometry import Polygon
 
 from kerfwright.model import Quantity
 
-__all__ = ["Neighbourhood", "Parts", "Planes", "Primitive", "Sheet"]
+__all__ = ["INFERRED_FACES", "Neighbourhood", "Parts", "Planes", "Primitive", "Sheet"]
+
+INFERRED_FACES = {"top": (0.0, 0.0, 1.0), "bottom": (0.0, 0.0, -1.0)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +61,8 @@ class Sheet:
     top_idx: np.ndarray  # cloud points on z = thickness, normals +z
     bottom_idx: np.ndarray  # cloud points on z = 0, normals -z
     cut_idx: np.ndarray  # cloud points on its cut faces
+    # ends m.xy = offset that nothing showed, as (mx, my, offset), and such faces (`INFERRED_FACES`)
+    inferred: tuple[tuple[float, float, float], ...] = ()
 
     @property
     def normal(self) -> np.ndarray:
