@@ -97,6 +97,12 @@ def test_few_views_need_a_stronger_seam(strength, views, clear):
     assert _is_clear(line) is clear
 
 
+@pytest.mark.parametrize(("strength", "clear"), [(6.0, False), (7.2, False), (8.0, True)])
+def test_the_first_step_of_tone_has_to_be_clearer_than_further_ones(strength, clear):
+    line = SeamLine(ACROSS, 100.0, np.zeros(2), np.array([0.0, 100.0]), strength, 12, by_tone=True)
+    assert _is_clear(line) is clear
+
+
 def stepping(strength: float, side: float, views: int = 6) -> ToneSteps:
     """A face whose tone steps to one side at 100 mm, as `views` photographs show it."""
     offsets = np.arange(0.0, 300.0)

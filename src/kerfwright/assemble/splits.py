@@ -36,8 +36,9 @@ __all__ = ["SeamLine", "SeamSearch", "find_seam_lines", "seam_contact", "seam_se
 
 LEAST_STRENGTH = 7.0  # of a board's best seam, against the usual change across lines of its face
 LENT_STRENGTH = 4.0  # of further ones: where two boards were glued, more may have been
-LEAST_TONE = 5.5  # of every seam told by tone: 30 made single boards (seeds from 1000) had 3.4 at most, those of the
-# captures 4.6, and of the joints of 30 panels that were found none had less than 5.8
+CLEAR_TONE = 7.5  # of a board's best seam, where tone tells it: a stool's top, which is one board, had 5.5, and 30 made
+# single boards (seeds from 1000) 3.4 at most
+LEAST_TONE = 5.5  # of further ones: of the joints of 30 panels that were found none had less than 5.8
 LINE_ALONG = 0.6  # share of a line's change in every third, where no geometry expects one: a year ring all along a made
 # single board had .55
 CERTAIN = 2.0  # times LEAST_STRENGTH; steep grain that passed for a seam in four views had up to 1.13
@@ -189,7 +190,7 @@ def _is_denied(seam: SeamLine, own: Change, other: Change | None, diameter: floa
 
 def _is_clear(seam: SeamLine) -> bool:
     """Whether a seam counts by itself: one that just passes must show in more than the least views."""
-    least = LEAST_TONE if seam.by_tone else LEAST_STRENGTH
+    least = CLEAR_TONE if seam.by_tone else LEAST_STRENGTH
     return seam.strength > least and (seam.views > LEAST_VIEWS or seam.strength > CERTAIN * LEAST_STRENGTH)
 
 
