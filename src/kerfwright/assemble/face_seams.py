@@ -13,7 +13,7 @@ from kerfwright.assemble.discontinuity import Discontinuity
 from kerfwright.assemble.tone import ToneSteps
 from kerfwright.identify.types import Sheet
 
-__all__ = ["LEAST_VIEWS", "NARROWEST", "SEPARATE", "Change", "SeamLine", "beside_face", "seams_of_face"]
+__all__ = ["LEAST_VIEWS", "NARROWEST", "SEPARATE", "Change", "SeamLine", "seams_of_face"]
 
 LEAST_ALONG = 0.5  # share of the change that every third of the line must show
 LEAST_VIEWS = 4
@@ -24,7 +24,6 @@ PARTNER = 0.7  # strength of the weaker line of the two
 NARROWEST = 1 / 16  # of D; narrower strips are shadows and edges more often than boards
 SEPARATE = 2 / 3  # of it, within which one joint is looked for
 KNOWN = 1 / 40  # of D, round lines in which other boards meet this one
-BESIDE = 1 / 4  # of the thickness, by which a board reaches beyond the face on which it shows
 
 Change = Discontinuity | ToneSteps
 
@@ -47,7 +46,7 @@ class SeamLine:
 def seams_of_face(
     sheet: Sheet, m: np.ndarray, change: Change, beside: list[Sheet], diameter: float, least: float
 ) -> list[SeamLine]:
-    """Seams of one face square to m that are stronger than `least`; `beside` are the boards that meet it there."""
+    """Seams of one face square to m that are stronger than `least`; `beside` are the boards that touch it."""
     ring = np.asarray(sheet.region.exterior.coords)[:, :2]
     margin = NARROWEST * diameter
     known = _known_lines(sheet, m, beside)
@@ -139,17 +138,3 @@ def _crosses_all(region: Polygon, m: np.ndarray, offset: float, reach: float) ->
         if chord.geom_type != "LineString" or chord.is_empty:
             return False
     return True
-
-
-def beside_face(sheet: Sheet, touching: list[Sheet], face: str) -> list[Sheet]:
-    """The boards that reach beyond a face ("top" or "bottom"): only they show on it."""
-    t = sheet.thickness.value
-    out = []
-    for other in touching:
-        ring = np.asarray(other.region.exterior.coords)[:, :2]
-        corners = np.concatenate([np.c_[ring, np.full(len(ring), z)] for z in (0.0, other.thickness.value)])
-        z = sheet.to_board(other.to_world(corners))[:, 2]
-        beyond = z.max() - t if face == "top" else -z.min()
-        if beyond > BESIDE * t:
-            out.append(other)
-    return out

@@ -21,7 +21,6 @@ from kerfwright.assemble.face_seams import (
     SEPARATE,
     Change,
     SeamLine,
-    beside_face,
     seams_of_face,
 )
 from kerfwright.assemble.texture import FaceStrips, face_strips
@@ -137,11 +136,10 @@ def _on_either_face(
 ) -> list[SeamLine]:
     """Seams of the face that shows the strongest one, all that the other face does not deny."""
     found = []
-    for face, own, other in zip(("top", "bottom"), faces, faces[::-1], strict=True):
+    for own, other in zip(faces, faces[::-1], strict=True):
         if own is None:
             continue
-        beside = beside_face(search.sheet, search.touching, face)
-        seams = seams_of_face(search.sheet, m, own, beside, search.diameter, least)
+        seams = seams_of_face(search.sheet, m, own, search.touching, search.diameter, least)
         found.append([s for s in seams if not _is_denied(s, own, other, search.diameter)])
     return max(found, key=_strongest, default=[])
 
