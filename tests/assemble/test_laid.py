@@ -8,7 +8,7 @@ from kerfwright.assemble import AssembleOptions
 from kerfwright.assemble.laid import laid_contacts
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.freespace import FreeSpace
-from kerfwright.identify.laid import laid_on
+from kerfwright.identify.laid import laid_on, put_on_plane
 from kerfwright.model import Origin, Quantity
 
 BLIND = FreeSpace((), (), 1.0, 1.0)
@@ -106,3 +106,10 @@ def test_two_finds_of_one_board_are_not_laid_on_each_other():
     again = sheet("again", pose((0, 0, 381)), 22, (-30, -140, 30, 0), quantity=sheets[1].thickness)
     assert all(s.thickness.value > 0 for s in laid_on((sheets[1], again), cloud, BLIND, OPTIONS))
     assert not laid_contacts(laid_on((sheets[1], again), cloud, BLIND, OPTIONS), 7.0)
+
+
+def test_a_board_keeps_a_thickness():
+    """A hidden face is not put where its board's other face is."""
+    (_, rail), _ = stool(22.0)
+    assert put_on_plane(rail, "top", np.array([0.0, 0.0, 1.0]), 380.0) is rail
+    assert put_on_plane(rail, "top", np.array([0.0, 0.0, 1.0]), 410.0).thickness.value == pytest.approx(30)

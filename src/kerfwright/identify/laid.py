@@ -171,9 +171,13 @@ def is_seen_through(pair: Pair, sheets: tuple[Sheet, ...], free: FreeSpace) -> b
 
 
 def put_on_plane(sheet: Sheet, face: str, normal: np.ndarray, offset: float) -> Sheet:
-    """The sheet as thick as it must be for a face of it to lie on a plane; its other face stays."""
+    """The sheet as thick as it must be for a face of it to lie on a plane; its other face stays. Unchanged where that
+    would take more than DEEPEST of its thickness.
+    """
     place = sheet.to_board((normal * offset)[None])[0, 2]
     thickness = place if face == "top" else sheet.thickness.value - place
+    if thickness < DEEPEST * sheet.thickness.value:
+        return sheet  # no board is left between its faces
     frame = sheet.world_from_board.copy()
     if face == "bottom":
         frame[:3, 3] += place * sheet.normal
