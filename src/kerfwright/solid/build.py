@@ -58,11 +58,12 @@ def board_face(board: Board) -> build123d.Face:
         If OCCT makes no face of the cut path.
     """
     from build123d import Face
+    from OCP.Standard import Standard_Failure, Standard_TypeMismatch
 
     path = board.cut_path
     try:
         face = Face(_wire(path.outer), [_wire(hole) for hole in path.holes])
-    except (ValueError, RuntimeError) as error:
+    except (ValueError, RuntimeError, Standard_Failure, Standard_TypeMismatch) as error:
         raise ModelError(f"board {board.name!r}: cut_path: {error}: no face: redraw the path") from error
     if face.area <= 0:
         raise ModelError(f"board {board.name!r}: cut_path: area {face.area:g} mm2: redraw the path")
