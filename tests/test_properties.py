@@ -269,7 +269,7 @@ def test_turned_moved_and_scaled_captures_are_one_once_prepared(angle, shift, sc
 
 
 def test_a_turned_and_moved_capture_has_the_same_boards():
-    """Without snapping: no board hangs on the last bit of a number."""
+    """Without snapping: what is chosen hangs on no last bit; how far boards are run on may, by millimetres."""
     options, motions = IdentifyOptions(), ((0.0, (0, 0, 0), 1.0), (2.0, (5e3, -2e3, 90), 25.4))
     found = [find_candidates(_prepared(*motion), options) for motion in motions]
     seen = [choose(candidates, options) for candidates in found]
