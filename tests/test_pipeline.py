@@ -33,7 +33,11 @@ def finding(code: str) -> Finding:
 
 
 def merged(origin: str = "assumed"):
-    parts = Parts(sheets=(), primitives=(), noise=0.1, notes=("one plane ignored",))
+    selection = {
+        "candidates": 6, "chosen": 4, "objective": 0.5, "bound": 0.75, "gap": 0.25, "explained": 0.9, "method": "exact",
+        "energy": None,
+    }  # fmt: skip
+    parts = Parts(sheets=(), primitives=(), noise=0.1, notes=("one plane ignored",), selection=selection)
     refined = SimpleNamespace(boards=(), contacts=(), findings=(finding("K200"), finding("K300")))
     return pipeline._model(refined, parts, capture(origin), ReconstructOptions(seed=3))
 
@@ -155,6 +159,7 @@ def test_the_model_says_where_it_lies_and_what_it_came_from():
     origin = model.provenance
     assert (origin.version, origin.capture, origin.seed) == (__version__, "stool", 3)
     assert (origin.points, origin.images) == (5, 0)
+    assert (origin.choice.chosen, origin.choice.candidates, origin.choice.gap) == (4, 6, 0.25)
     assert origin.options == {
         "up": "z", "millimetres_per_unit": None, "seed": 3, "crop": "auto", "ground": None, "length": "", "markers": "",
         "scale_by_stock": False, "stock": "", "without": "",

@@ -327,7 +327,7 @@ def _model(refined: Refined, parts: Parts, capture: Capture, options: Reconstruc
 
     import numpy as np
 
-    from kerfwright.model import Model, Provenance
+    from kerfwright.model import Choice, Model, Provenance
     from kerfwright.model.frames import rows
     from kerfwright.model.resize import resized_board, resized_contact
 
@@ -336,6 +336,7 @@ def _model(refined: Refined, parts: Parts, capture: Capture, options: Reconstruc
     provenance = Provenance(
         version=__version__, capture=capture.name, images=len(capture.views), points=len(capture.cloud),
         seed=options.seed, options=asdict(options),
+        choice=parts.selection and Choice(**{name: parts.selection[name] for name in Choice.model_fields}),
     )
     notes = [_remark("K001", text) for text in capture.notes] + [_remark("K002", text) for text in parts.notes]
     return Model(

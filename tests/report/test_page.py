@@ -22,6 +22,7 @@ from kerfwright.capture.types import Capture, Cloud, View
 from kerfwright.model import (
     Bevel,
     Board,
+    Choice,
     Contact,
     ContactEvidence,
     CutPath,
@@ -69,6 +70,9 @@ CONTACT = Contact(
     angle=90.0,
     evidence=ContactEvidence(seam_score=0.8, seam_score_other=0.3, views=5, decided_by="seam"),
 )
+CHOICE = Choice(
+    method="exact", candidates=6, chosen=3, objective=0.8125, bound=0.8135, gap=0.001, explained=0.9
+)
 MODEL = Model(
     name="a <b>tray</b>",
     boards=(
@@ -82,7 +86,7 @@ MODEL = Model(
         Finding(code="K003", severity="warning", message="a warning"),
         Finding(code="K110", severity="error", message="an error", remedy="mend it"),
     ),
-    provenance=Provenance(version="1.2", capture="c", images=2, points=900),
+    provenance=Provenance(version="1.2", capture="c", images=2, points=900, choice=CHOICE),
 )
 
 
@@ -151,6 +155,8 @@ def test_it_says_what_the_model_says(capture):
         "edge on face, at a corner 14.4 90.0 seam in the photographs: 0.80 against 0.30 in 5 views",
         "error K110 an error mend it warning K003 a warning",
         "1.2 from c: 2 photographs, 900 points",
+        "3 of 6 candidates chosen, which explain 90 % of the cloud; objective 0.8125 (exact), "
+        "no choice is better by more than 0.001",
     ):
         assert words in text, words
 

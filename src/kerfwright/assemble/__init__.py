@@ -26,11 +26,11 @@ def assemble(parts: Parts, capture: Capture, options: AssembleOptions | None = N
     StageError when that does not converge.
     """
     from kerfwright.assemble.contacts import to_contact
-    from kerfwright.assemble.depths import remeasured
     from kerfwright.assemble.inferred import told
     from kerfwright.assemble.laid import laid_contacts
     from kerfwright.assemble.veils import still_open, unveiled
     from kerfwright.identify.align import align_sheets
+    from kerfwright.identify.depths import remeasured
     from kerfwright.identify.freespace import see_through
     from kerfwright.identify.photo_edges import Photos
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kerfwright.assemble.options import AssembleOptions
-from kerfwright.assemble.stock import with_thickness
+from kerfwright.identify.faces import with_thickness
 from kerfwright.identify.joints import Joint, columns, face_plane, trace_of
 from kerfwright.identify.photo_edges import Photos, SweepResult, refine_peak
 from kerfwright.identify.seams import sweep_line

@@ -15,8 +15,8 @@ from kerfwright.assemble.decided import Decided
 from kerfwright.assemble.flush_ends import flush_trace
 from kerfwright.assemble.mitres import mitred
 from kerfwright.assemble.options import AssembleOptions
-from kerfwright.assemble.stock import with_thickness
 from kerfwright.errors import StageError
+from kerfwright.identify.faces import with_thickness
 from kerfwright.identify.joints import Joint, face_plane, trace_of
 from kerfwright.identify.types import Sheet
 from kerfwright.model import Origin

@@ -4,16 +4,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from kerfwright.assemble.faces import robust_mean
 from kerfwright.assemble.options import AssembleOptions
+from kerfwright.identify.faces import robust_mean, with_thickness
 from kerfwright.identify.types import Sheet
 from kerfwright.model import Origin, Quantity
 
-__all__ = ["share_thickness", "with_thickness"]
+__all__ = ["share_thickness"]
 
 GUESSED = 0.1  # relative difference between a guessed thickness and the stock that it was taken from, as then measured
 
@@ -67,10 +65,3 @@ def _clusters(members: np.ndarray, value: np.ndarray, error: np.ndarray, sigmas:
             break
         groups = [g for g in groups if g is not a and g is not b] + [a + b]
     return groups
-
-
-def with_thickness(sheet: Sheet, thickness: Quantity) -> Sheet:
-    """The sheet with another thickness; its top stays where it is."""
-    board = sheet.world_from_board.copy()
-    board[:3, 3] += (sheet.thickness.value - thickness.value) * sheet.normal
-    return replace(sheet, world_from_board=board, thickness=thickness)

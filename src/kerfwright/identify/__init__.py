@@ -102,24 +102,28 @@ def choose(found: Candidates, options: IdentifyOptions) -> Parts:
     chosen = join_across(boards, reach)
     chosen.sort(key=lambda s: (-round(s.region.area), *s.world_from_board[:3, 3].round(3)))
     sheets = tuple(to_sheet(f"board_{k + 1:02d}", slab, cloud, around, options) for k, slab in enumerate(chosen))
+    bound = selection.bound
     figures = {
-        "candidates": len(slabs), "chosen": len(selection.chosen), "objective": selection.objective,
-        "bound": selection.bound, "explained": selection.explained, "method": selection.method,
-        "energy": selection.energy,
+        "candidates": len(slabs), "chosen": len(selection.chosen), "objective": selection.objective, "bound": bound,
+        "gap": None if bound is None else bound - selection.objective, "explained": selection.explained,
+        "method": selection.method, "energy": selection.energy,
     }
     notes = _notes(selection.explained, options.least_explained)
     return Parts(sheets, tuple(found.planes), around.noise, around.spacing, notes, figures)
 
 
 def made_whole(parts: Parts, found: Candidates, options: WholeOptions | None = None) -> Parts:
-    """The parts with their boards aligned, run on over what nobody saw, and parted where they lie side by side.
+    """The parts with their boards aligned, run on over what nobody saw, parted where they lie side by side, and
+    measured in the photographs once more now that it is known where they end.
 
     Raises StageError when their alignment does not converge.
     """
+    from kerfwright.identify.depths import remeasured
     from kerfwright.identify.whole import whole_boards
 
     cloud, options = found.capture.cloud, options or WholeOptions()
     sheets, ends = whole_boards(parts.sheets, cloud, found.photos, found.free, options)
+    sheets = remeasured(sheets, cloud, found.photos, parts.noise)
     return replace(parts, sheets=sheets, ends=ends)
 
 

@@ -18,6 +18,7 @@ __all__ = [
     "Bevel",
     "Board",
     "BuildStep",
+    "Choice",
     "Connector",
     "Contact",
     "ContactEvidence",
@@ -140,6 +141,25 @@ class Scale(Frozen):
     note: str = ""
 
 
+class Choice(Frozen):
+    """How the boards were chosen among what could be boards; see `kerfwright.identify.selection`.
+
+    Attributes
+    ----------
+    objective : of the boards chosen; larger is better, and 1 would be all of the surface explained at no cost.
+    bound : what no choice among the candidates exceeds; None where the method proves nothing.
+    explained : share of the surface observed that the boards explain.
+    """
+
+    method: Literal["exact", "annealing"]
+    candidates: int
+    chosen: int
+    objective: float
+    bound: float | None
+    gap: float | None  # bound less objective
+    explained: float
+
+
 class Provenance(Frozen):
     """What the model was made from; no times, no machine names: these are in run.json."""
 
@@ -150,6 +170,7 @@ class Provenance(Frozen):
     points: int = 0
     seed: int = 0
     options: dict[str, str | int | float | bool | None] = Field(default_factory=dict)
+    choice: Choice | None = None  # None for models that were not reconstructed
 
 
 class Model(Frozen):

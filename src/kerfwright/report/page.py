@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kerfwright.model import Model
+from kerfwright.model import Choice, Model
 from kerfwright.report.cards import boards_section
 from kerfwright.report.cutting import CutSheet, sheets_section
 from kerfwright.report.deviation import Deviation, deviation
@@ -99,5 +99,16 @@ def _foot(model: Model) -> str:
     made = model.provenance
     return (
         f"<footer>{escape(made.program)} {escape(made.version)} from {escape(made.capture) or 'a model'}: "
-        f"{made.images} photographs, {made.points} points, seed {made.seed}.</footer>"
+        f"{made.images} photographs, {made.points} points, seed {made.seed}.{_chosen(made.choice)}</footer>"
+    )
+
+
+def _chosen(choice: Choice | None) -> str:
+    """How the boards were chosen, for those who want to know how sure that is."""
+    if choice is None:
+        return ""
+    proven = "not proven best" if choice.gap is None else f"no choice is better by more than {choice.gap:.2g}"
+    return (
+        f" {choice.chosen} of {choice.candidates} candidates chosen, which explain {100 * choice.explained:.0f} % of "
+        f"the cloud; objective {choice.objective:.4f} ({choice.method}), {proven}."
     )

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from clouds import pose, sheet
-from kerfwright.assemble.depths import _between, _easing, _Edges, _far_edge, _settled
-from kerfwright.assemble.faces import Faces, believed, measured_faces, robust_mean, stereo_bias
 from kerfwright.capture.types import Cloud
+from kerfwright.identify import Candidates, Parts, made_whole
+from kerfwright.identify.depths import _between, _easing, _Edges, _far_edge, _settled
+from kerfwright.identify.faces import Faces, believed, measured_faces, robust_mean, stereo_bias
+from kerfwright.identify.freespace import FreeSpace
 
 SIZE = 500.0
 TOP = 18.0  # where the true face is
@@ -97,3 +99,13 @@ def test_a_board_moves_to_the_faces_that_were_measured(top, bottom, height):
     board = _settled(sheet("a", pose(), 18.0, (0, 0, 200, 200)), np.nan_to_num([top, bottom]), error, None, 0.0, SIZE)
     assert board.thickness.value == pytest.approx(18.0)
     assert board.to_world(np.array([[0.0, 0, 18.0]]))[0, 2] == pytest.approx(height, abs=0.01)
+
+
+def test_boards_that_are_whole_lie_on_the_faces_that_photographs_show(monkeypatch):
+    """Identification measures once it knows where boards end: stereo had this one .4 mm too high."""
+    board, cloud = board_with_points(TOP + 0.4)
+    monkeypatch.setattr(Cloud, "diameter", SIZE, raising=False)
+    blind = FreeSpace((), (), 1.0, 1.0)
+    found = Candidates(SimpleNamespace(cloud=cloud), None, blind, Grain(), [], [], [], None)
+    (whole,) = made_whole(Parts((board,), (), 0.1), found).sheets
+    assert whole.to_world(np.array([[100.0, 100, whole.thickness.value]]))[0, 2] == pytest.approx(TOP, abs=0.06)

@@ -18,9 +18,10 @@ import shapely
 from kerfwright.capture.types import Cloud
 from kerfwright.identify.photo_edges import Photos, refine_peak
 from kerfwright.identify.types import Sheet
+from kerfwright.model import Quantity
 from kerfwright.parallel import each
 
-__all__ = ["Faces", "believed", "measured_faces", "robust_mean", "stereo_bias"]
+__all__ = ["Faces", "believed", "measured_faces", "moved", "robust_mean", "stereo_bias", "with_thickness"]
 
 WINDOW, SPACING = 1 / 31, 1 / 625  # of D: side of a window of grain, and between places that are read in it
 WINDOWS, VIEWS, LEAST_VIEWS = 30, 7, 4
@@ -206,3 +207,10 @@ def moved(sheet: Sheet, shift: float) -> Sheet:
     board = sheet.world_from_board.copy()
     board[:3, 3] += shift * sheet.normal
     return replace(sheet, world_from_board=board)
+
+
+def with_thickness(sheet: Sheet, thickness: Quantity) -> Sheet:
+    """The sheet with another thickness; its top stays where it is."""
+    board = sheet.world_from_board.copy()
+    board[:3, 3] += (sheet.thickness.value - thickness.value) * sheet.normal
+    return replace(sheet, world_from_board=board, thickness=thickness)

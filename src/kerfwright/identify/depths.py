@@ -15,9 +15,8 @@ import shapely
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
-from kerfwright.assemble.faces import Faces, measured_faces, moved, robust_mean
-from kerfwright.assemble.stock import with_thickness
 from kerfwright.capture.types import Cloud
+from kerfwright.identify.faces import Faces, measured_faces, moved, robust_mean, with_thickness
 from kerfwright.identify.photo_edges import Photos, refine_peak, sweep_edge
 from kerfwright.identify.thickness import looking_at
 from kerfwright.identify.types import Sheet
