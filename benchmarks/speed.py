@@ -49,6 +49,13 @@ def of_cores(run: Run) -> Run:
     return replace(run, seconds=sum(run.cpu.values()), stages=run.cpu)
 
 
+def _remark(run: Run) -> str:
+    """Why a run has no results; exit code 1 beside results is for findings that forbid cutting."""
+    if run.stages:
+        return "errors found" if run.code == 1 else ""
+    return f"exit {run.code}: {run.last_line[-60:]}"
+
+
 def series(title: str, sizes: Sequence[float], runs: Sequence[Run]) -> str:
     """One table: a line a size, and the exponents under it; runs that failed are shown and not fitted."""
     rows = [
@@ -57,7 +64,7 @@ def series(title: str, sizes: Sequence[float], runs: Sequence[Run]) -> str:
             *(f"{run.stages[s]:.2f}" if s in run.stages else "-" for s in STAGES),
             f"{run.seconds:.1f}",
             "-" if run.peak_gib is None else f"{run.peak_gib:.2f}",
-            "" if run.code in (0, 1) else f"exit {run.code}: {run.last_line[-60:]}",
+            _remark(run),
         ]
         for size, run in zip(sizes, runs, strict=True)
     ]

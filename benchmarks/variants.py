@@ -27,16 +27,29 @@ def with_points(source: Path, folder: Path, count: int) -> Path:
 
 
 def with_images(source: Path, folder: Path, count: int) -> Path:
-    """The capture with so many of its photographs, evenly chosen."""
+    """The capture with so many photographs: evenly chosen ones, or copies under other names where there are too few.
+
+    A copy shows what its original shows, from the same place: it is work, and nothing new.
+    """
     capture = open_capture(source)
-    keep = np.linspace(0, len(capture.views) - 1, count).round().astype(int)
-    return _written(capture, [capture.views[k] for k in keep], capture.cloud, folder)
+    total = len(capture.views)
+    if count <= total:
+        views = [capture.views[k] for k in np.linspace(0, total - 1, count).round().astype(int)]
+    else:
+        views = [_numbered(capture.views[k % total], k // total) for k in range(count)]
+    return _written(capture, views, capture.cloud, folder)
 
 
 def with_pixels(source: Path, folder: Path, factor: float) -> Path:
     """The capture with its photographs shrunk along each side."""
     capture = open_capture(source)
     return _written(capture, capture.views, capture.cloud, folder, factor)
+
+
+def _numbered(view: View, number: int) -> View:
+    """The view under another name, but for number 0."""
+    name = Path(view.name)
+    return replace(view, name=str(name.with_stem(f"{name.stem}_copy_{number}"))) if number else view
 
 
 def _written(capture: Capture, views, cloud: Cloud, folder: Path, factor: float = 1.0) -> Path:

@@ -301,10 +301,11 @@ def _working_stock(capture: Capture, stock: str, factor: float | None) -> Stock:
 
 def _check(refined: Refined, parts: Parts, capture: Capture, options: ReconstructOptions) -> Model:
     from kerfwright.solid import CheckOptions, check
+    from kerfwright.solid.sound import with_solids
     from kerfwright.solid.trim import fitted_together
 
     model = _scaled_by_boards(_model(refined, parts, capture, options), options, refined.scale_factor)
-    model = fitted_together(_with_stock(model, options))
+    model = fitted_together(with_solids(_with_stock(model, options)))
     return model.model_copy(update={"findings": (*model.findings, *check(model, CheckOptions()))})
 
 

@@ -85,6 +85,15 @@ def test_missing_parts_are_told(capture_folder, names, told):
     assert "\n" not in str(error.value)
 
 
+def test_a_photograph_with_two_cameras_is_told(capture_folder):
+    poses = capture_folder / "sparse" / "0" / "images.txt"
+    lines = poses.read_text().splitlines()
+    again = lines[2].split(maxsplit=1)[1]
+    poses.write_text("\n".join([*lines, f"99 {again}", ""]) + "\n")
+    with pytest.raises(CaptureError, match=r"images: \S+\.png: two cameras have this photograph"):
+        open_capture(capture_folder)
+
+
 def test_a_file_is_no_capture(capture_folder):
     with pytest.raises(CaptureError, match="no such folder"):
         open_capture(capture_folder / "cloud.ply")

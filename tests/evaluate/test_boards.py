@@ -3,6 +3,7 @@
 import importlib
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +114,20 @@ def test_fewer_photographs_and_fewer_pixels_keep_their_cameras(bench, capture, t
     x = np.array([[0.0, 0.0, 0.1]])
     whole = open_capture(capture).views[0].project(x)[0]
     assert small.views[0].project(x)[0] == pytest.approx(whole / 2)
+
+
+def test_more_photographs_than_there_are_have_names_and_files_of_their_own(bench, capture, tmp_path):
+    more = open_capture(bench("variants").with_images(capture, tmp_path / "m", 9))
+    assert len({view.path for view in more.views}) == len({view.name for view in more.views}) == 9
+    assert len({tuple(view.camera_from_world.ravel().round(9)) for view in more.views}) == 6
+
+
+def test_a_run_without_results_is_told_whatever_its_exit_code(bench):
+    speed, run = bench("speed"), bench("runs").Run
+    crashed = run(1, 3.0, last_line="kerfwright: error: this is a bug in kerfwright")
+    whole = run(1, 9.0, dict.fromkeys(speed.STAGES, 1.5), 1.0)
+    page = speed.series("Boards", [4, 8, 16], [whole, crashed, replace(whole, code=0)])
+    assert "exit 1: kerfwright: error: this is a bug in kerfwright" in page and page.count("errors found") == 1
 
 
 def test_captures_are_found_in_folders_of_them(bench, capture):

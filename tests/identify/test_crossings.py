@@ -60,3 +60,21 @@ def test_ends_that_are_not_flush_tell_nothing():
     sheets = crossing(top=140.0)
     found = settled(sheets, joints_along("y"))
     assert all(a is b for a, b in zip(sheets, found.values(), strict=True))
+
+
+def test_a_board_in_three_pieces_becomes_one_through_both_that_it_crosses():
+    """The first exchange makes other boards of three names; the second crossing is among what it made."""
+    along_x = [pose((0, y + 6, 0), (1, 0, 0), (0, 0, 1)) for y in (0, 100)]
+    wholes = [sheet(f"whole_{k}", frame, 12.0, (-200, 0, 200, 100)) for k, frame in enumerate(along_x)]
+    spans = ((-200.0, -6.0), (6.0, 94.0), (106.0, 200.0))
+    pieces = [sheet(f"piece_{k}", ALONG_Y, 12.0, (a, 0, b, 100)) for k, (a, b) in enumerate(spans)]
+
+    def tone(x, y):
+        joints = (np.abs(np.abs(x) - 6) < 0.8) & ((np.abs(y) < 6) | (np.abs(y - 100) < 6))
+        return np.where(joints, 90.0, 150.0)
+
+    found = settled([*wholes, *pieces], tone)
+    along_y = [s for s in found.values() if abs(s.normal[0]) > 0.9]
+    assert [s.region.symmetric_difference(box(-200, 0, 200, 100)).area < 1 for s in along_y] == [True]
+    halves = sorted(tuple(np.round(s.region.bounds)) for s in found.values() if abs(s.normal[1]) > 0.9)
+    assert halves == [(-200, 0, -6, 100), (-200, 0, -6, 100), (6, 0, 200, 100), (6, 0, 200, 100)]

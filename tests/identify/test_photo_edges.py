@@ -71,6 +71,13 @@ def test_no_view_no_answer(tmp_path):
     assert sweep_edge(photos, outside, ALONG_X, OFFSETS, np.ones((6, len(PLACES)), bool)) is None
 
 
+@pytest.mark.parametrize("count", [0, 1, 3, 4])
+def test_a_sweep_too_short_for_a_peak_tells_nothing(tmp_path, count):
+    every = np.ones((6, len(PLACES)), bool)
+    assert sweep_edge(photos_of(tmp_path), PLACES, ALONG_X, OFFSETS[:count], every) is None
+    assert sweep_edge(photos_of(tmp_path), PLACES, ALONG_X, OFFSETS[:5], every).views == 6
+
+
 def test_a_plain_face_stands_out_nowhere(tmp_path):
     photos = photos_of(tmp_path, edge=1000.0)
     plain = sweep_edge(photos, PLACES, ALONG_X, OFFSETS, np.ones((6, len(PLACES)), bool))

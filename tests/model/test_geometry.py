@@ -98,6 +98,7 @@ def test_transforms_keep_senses_area_and_shape():
         assert path_area(other) == pytest.approx(path_area(path))
         assert signed_area(other.outer) > 0 > signed_area(other.holes[0])
         assert path_polygon(other).is_valid
+        assert all(type(e.clockwise) is bool for hole in other.holes for e in hole.edges if isinstance(e, Circle))
     np.testing.assert_allclose(edge_points(mirrored.outer.edges[-1], [0])[0] * (-1, 1), turned.outer.edges[0].end)
     with pytest.raises(ValueError, match="similarity"):
         transform_edge(path.outer.edges[1], np.array([[2.0, 0, 0], [0, 1, 0]]))

@@ -15,7 +15,7 @@ from kerfwright.solid import assembly_solids, check
 from kerfwright.solid.faces import shape_of
 from kerfwright.solid.interference import common_volume
 from kerfwright.solid.trim import fitted_together
-from simple import board, placed, polygon, rectangle, stool
+from simple import board, hole, placed, polygon, rectangle, stool
 
 CURVE = Bezier(start=(0, 0), control_1=(20, 30), control_2=(50, -10), end=(80, 5))
 
@@ -88,6 +88,18 @@ def test_a_deep_overlap_is_left_for_the_checker():
     model = longer_legs(3.0)
     assert fitted_together(model).boards == model.boards
     assert "K110" in {f.code for f in check(fitted_together(model))}
+
+
+def test_an_outline_that_trimming_would_lead_through_a_hole_is_left():
+    """A hole .02 mm from the end that runs .03 mm into the top."""
+    model = longer_legs(0.03)
+    holes = (hole(380.03 - 5 - 0.02, 150, 5.0),)
+    legs = [leg.model_copy(update={"cut_path": board(rectangle(380.03, 300), holes=holes).cut_path})
+            for leg in model.boards[1:]]  # fmt: skip
+    model = model.model_copy(update={"boards": (model.boards[0], *legs)})
+    trimmed = fitted_together(model)
+    assert [b.cut_path for b in trimmed.boards] == [b.cut_path for b in model.boards]
+    assert not {f.code for f in check(trimmed)} & {"K105", "K106", "K109"}
 
 
 def test_only_what_lies_in_a_neighbour_is_cut_off():

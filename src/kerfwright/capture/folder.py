@@ -96,10 +96,12 @@ def _missing_note(missing: list[str], there: int) -> tuple[str, ...]:
 
 
 def _check_different(views: tuple[View, ...], source: Path) -> None:
-    """Two cameras of one photograph: names were matched by their ends, and folders are missing."""
+    """Two cameras of one photograph: listed twice, or names were matched by their ends and folders are missing."""
     seen: dict[Path, str] = {}
     for view in views:
         if view.path in seen:
+            if seen[view.path] == view.name:
+                raise capture_error(source, "images", view.name, "two cameras have this photograph: drop one of them")
             found = f"{seen[view.path]} and {view.name}"
             raise capture_error(source, "images", found, f"both are {view.path}: keep the folders that the names have")
         seen[view.path] = view.name

@@ -45,13 +45,19 @@ class _Crossing:
     before: Sheet
     after: Sheet
 
+    @property
+    def names(self) -> frozenset[str]:
+        return frozenset((self.through.name, self.before.name, self.after.name))
+
 
 def crossings_settled(sheets: Sequence[Sheet], cloud: Cloud, photos: Photos, obstacles: Obstacles) -> tuple[Sheet, ...]:
-    """The sheets, the whole board of a crossing and the two pieces exchanged where the photographs show it."""
-    out = list(sheets)
-    for names in [(c.through.name, c.before.name, c.after.name) for c in _crossings(out, cloud.diameter)]:
-        found = {s.name: s for s in out}
-        crossing = _Crossing(*(found[name] for name in names))
+    """The sheets, the whole board of a crossing and the two pieces exchanged where the photographs show it.
+
+    An exchange gives names to other boards: crossings are looked for again after it, and no three names asked twice.
+    """
+    out, asked = list(sheets), set()
+    while crossing := next((c for c in _crossings(out, cloud.diameter) if c.names not in asked), None):
+        asked.add(crossing.names)
         if _other_runs_through(crossing, photos, obstacles, cloud.diameter):
             new = {s.name: s for s in _exchanged(crossing, cloud)}
             out = [new.get(s.name, s) for s in out]

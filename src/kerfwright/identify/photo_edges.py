@@ -18,6 +18,8 @@ from kerfwright.capture.types import Capture, View
 
 __all__ = ["Photos", "SweepResult", "refine_peak", "sweep_edge"]
 
+RIM = 2  # offsets at either end of a sweep where no peak is believed
+
 
 class Photos:
     """Photographs of a capture, sampled bilinearly."""
@@ -62,10 +64,10 @@ def sweep_edge(
 
     places (N, 3) world mm, neighbours in order along the edge; direction (3,) or (N, 3) unit; offsets (T,) mm, evenly
     spaced; visible (V, N) bool: which view shows which place, or (V, N, T): at which offset. smoothing: mm of the step
-    detector. chunk: places averaged before the step is measured. None when no view shows a whole chunk, or there is
-    only one offset.
+    detector. chunk: places averaged before the step is measured. None when no view shows a whole chunk, or there are
+    too few offsets for a peak with others on both sides.
     """
-    if len(offsets) < 2:
+    if len(offsets) <= 2 * RIM:
         return None
     direction = np.broadcast_to(direction, places.shape)
     grid = places[:, None, :] + offsets[None, :, None] * direction[:, None, :]
@@ -106,8 +108,8 @@ def _combine(slopes: np.ndarray, owners: list[int], offsets: np.ndarray) -> Swee
     told = np.isfinite(limited).sum(axis=0)
     strength = np.nansum(limited, axis=0) / np.maximum(told, 1)
     strength[told == 0] = np.median(strength[told > 0])
-    inner = slice(2, len(offsets) - 2)
-    k = 2 + int(np.argmax(strength[inner]))
+    inner = slice(RIM, len(offsets) - RIM)
+    k = RIM + int(np.argmax(strength[inner]))
     best = float(offsets[k] + refine_peak(strength[k - 1 : k + 2]) * (offsets[1] - offsets[0]))
     error = _standard_error(limited, owners, k, offsets)
     shown = (maximum_filter1d(np.nan_to_num(limited), 3, axis=1) > 2.0).sum(axis=0) / np.maximum(told, 1)

@@ -25,7 +25,7 @@ from kerfwright.model.geometry import (
 )
 from kerfwright.model.types import Board, Model
 
-__all__ = ["Fault", "faults"]
+__all__ = ["Fault", "faults", "path_problem"]
 
 # Names become file names, STEP labels and spreadsheet cells: one rule that is safe in all of them. Letters of any
 # script; exporters write them as each format can carry them.
@@ -124,6 +124,12 @@ def _pose_problem(pose: np.ndarray) -> str | None:
     return "its turn mirrors" if np.linalg.det(turn) < 0 else None
 
 
+@np.errstate(all="ignore")
+def path_problem(path: CutPath) -> str | None:
+    """The first thing that is wrong with a cut path; None for a sound one."""
+    return next((f"{field}: {found}" for field, _, found, _ in _path_problems(path)), None)
+
+
 def _path_problems(path: CutPath) -> Iterator[tuple[str, str, str, str]]:
     """(field, code, found, remedy) of what is wrong with a cut path."""
     loops = (("outer", path.outer, 1), *((f"holes[{k}]", hole, -1) for k, hole in enumerate(path.holes)))
@@ -144,7 +150,11 @@ def _loop_problem(loop: Loop) -> tuple[str, str, str] | None:
     if any(isinstance(e, Circle) for e in loop.edges) and len(loop.edges) > 1:
         return "K105", "a circle beside other edges", "a circle is the only edge of its loop"
     for k, edge in enumerate(loop.edges):
-        if edge_length(edge) < JOIN_TOLERANCE:
+        try:
+            length = edge_length(edge)
+        except ValueError:
+            return "K105", f"edge {k} is an arc whose three points lie in one line", "make it a line"
+        if length < JOIN_TOLERANCE:
             return "K105", f"edge {k} has no length", "drop it"
         after = loop.edges[(k + 1) % len(loop.edges)]
         gap = float(np.hypot(*np.subtract(edge_start(after), edge_end(edge))))

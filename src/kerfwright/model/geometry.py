@@ -271,7 +271,7 @@ def transform_edge(edge: Edge, target_from_source: np.ndarray) -> Edge:
     fields = ("start", "mid", "control_1", "control_2", "end", "centre")
     moved = {f: _apply(m, getattr(edge, f)) for f in fields if hasattr(edge, f)}
     if isinstance(edge, Circle):
-        mirrored = np.linalg.det(m[:, :2]) < 0
+        mirrored = bool(np.linalg.det(m[:, :2]) < 0)
         moved |= {"radius": float(edge.radius * scale), "clockwise": edge.clockwise != mirrored}
     return edge.model_copy(update=moved)
 

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
-import shapely
 from shapely.geometry import Polygon
-from shapely.geometry.polygon import orient
 
 from kerfwright.assemble.types import Assembly, ConstraintSegment
 from kerfwright.capture.types import Capture, Cloud
 from kerfwright.errors import StageError
 from kerfwright.identify.outlines import constrained_region
-from kerfwright.model import CutPath, Finding, Line, Loop
+from kerfwright.model import CutPath, Finding
 from kerfwright.model.geometry import edge_length
+from kerfwright.model.plain import SHORTEST, polygon_path
 from kerfwright.refine.boards import to_boards
 from kerfwright.refine.constrain import to_loops
 from kerfwright.refine.curves import CurveOptions, fit_curves
@@ -25,7 +22,6 @@ from kerfwright.refine.unsure import less_sure_at_contacts
 
 __all__ = ["finished"]
 
-SHORTEST = 1e-3  # mm; OCCT makes no edge of less
 SMOOTHED = "spurs of the boundary were left out: it was too rough to fit as traced"
 
 
@@ -82,14 +78,3 @@ def _refuse_short_edges(path: CutPath) -> None:
     short = [e for loop in (path.outer, *path.holes) for e in loop.edges if edge_length(e) < SHORTEST]
     if short:
         raise StageError(f"cut path: edges: {len(short)} have no length: the boundary is too rough there")
-
-
-def polygon_path(region: Polygon, tolerance: float) -> CutPath:
-    """A polygon's rings as lines, simplified to a tolerance in mm."""
-    plain = orient(shapely.set_precision(region.simplify(tolerance), SHORTEST).buffer(0))
-    plain = max(getattr(plain, "geoms", [plain]), key=lambda p: p.area)
-    loops = []
-    for ring in (plain.exterior, *plain.interiors):
-        points = [tuple(map(float, p)) for p in ring.coords]
-        loops.append(Loop(edges=tuple(Line(start=a, end=b) for a, b in pairwise(points))))
-    return CutPath(outer=loops[0], holes=tuple(loops[1:]))

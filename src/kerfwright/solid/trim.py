@@ -24,6 +24,7 @@ from kerfwright.solid.build import board_solid, location
 from kerfwright.solid.contacts import interface_polygons, meet
 from kerfwright.solid.faces import FlatFace, Shape, shape_of
 from kerfwright.solid.interference import common_solid, near_pairs, penetration
+from kerfwright.solid.sound import solid_problem
 
 if TYPE_CHECKING:
     from shapely.geometry import Polygon
@@ -99,7 +100,8 @@ def _without_slits(model: Model, width: float) -> dict[str, Board]:
         outline = boards[board.name].cut_path.outer
         loop = without_slits(outline, width)
         if loop != outline:
-            boards |= _family(boards, board, loop)
+            family = _family(boards, board, loop)
+            boards |= family if not any(map(solid_problem, family.values())) else {}
     return boards
 
 
@@ -148,8 +150,9 @@ def _trimmed(
         loop = clipped_loop(board.cut_path.outer, area)
         if loop is not None:
             loop = without_idle_nodes(loop, options.touch)
-            if _is_sound(_with_outline(board, loop)):
-                return _family(boards, board, loop)
+            family = _family(boards, board, loop)
+            if not any(map(solid_problem, family.values())):
+                return family
     return None
 
 
@@ -205,15 +208,6 @@ def _sheet_lines(
 
 def _with_outline(board: Board, loop: Loop) -> Board:
     return board.model_copy(update={"cut_path": board.cut_path.model_copy(update={"outer": loop})})
-
-
-def _is_sound(board: Board) -> bool:
-    """Whether the trimmed board still has a solid: its bevels may have lost the edges that they are on."""
-    try:
-        board_solid(board)
-    except ModelError:
-        return False
-    return True
 
 
 def _family(boards: dict[str, Board], board: Board, loop: Loop) -> dict[str, Board]:
