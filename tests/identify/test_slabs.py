@@ -2,14 +2,23 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from shapely.geometry import box
+from shapely.geometry import Polygon, box
 
 from clouds import box_cloud, pose
 from kerfwright.identify import IdentifyOptions
 from kerfwright.identify.bars import Bar
 from kerfwright.identify.primitives import look_around
 from kerfwright.identify.sheets import join_across, to_sheet
-from kerfwright.identify.slabs import Slab, _above_floor, _ends_above, _is_parted, footprint, plane_frame
+from kerfwright.identify.slabs import (
+    Slab,
+    _above_floor,
+    _ends_above,
+    _is_air,
+    _is_parted,
+    _Scene,
+    footprint,
+    plane_frame,
+)
 from kerfwright.identify.thickness import ThicknessHypothesis
 from kerfwright.model import Origin
 
@@ -173,3 +182,25 @@ def test_feet_on_both_sides_of_a_frame_are_no_bar(frame, parted):
     ends = [np.array([[0.0, y, z] for z in (10, 25, 40)]) for y in (90.0, -90.0)]
     assert _is_parted(SimpleNamespace(fringe=8.0), bar, ends, [across, *feet]) is parted
     assert not _is_parted(SimpleNamespace(fringe=8.0), bar, ends, feet)
+
+
+def seen_through_at(x: float) -> _Scene:
+    """A scene of D = 500 in which cameras saw through a layer of 20 mm about some x: one compartment of a row."""
+    cloud = SimpleNamespace(diameter=500.0)
+    free = SimpleNamespace(votes=lambda places: np.where(np.abs(places[:, 0] - x) < 10, 3, 0))
+    around = SimpleNamespace(spacing=1.0)
+    return _Scene(SimpleNamespace(cloud=cloud), around, [], free, IdentifyOptions(), None)
+
+
+@pytest.mark.parametrize(("thickness", "x", "air"), [(60.0, 40, True), (60.0, 900, False), (24.0, 40, False)])
+def test_a_thickness_that_reaches_through_a_compartment_is_none(thickness, x, air):
+    frame = plane_frame(np.array([0.0, 0, 1]), np.array([0.0, 0, 100]))
+    corners = np.array([[0.0, 0, 100], [400, 0, 100], [400, 80, 100], [0, 80, 100]])
+    piece = Polygon(((corners - frame[:3, 3]) @ frame[:3, :3])[:, :2])
+    guess = ThicknessHypothesis(thickness, 0.2, "photos", 5.0)
+    assert _is_air(seen_through_at(x), frame, piece, guess) == air
+
+
+def test_only_thick_boards_must_not_be_seen_through_at_all():
+    scene = seen_through_at(0)
+    assert (scene.most_free(24.0), scene.most_free(26.0)) == (0.25, 0.02)

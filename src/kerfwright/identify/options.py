@@ -59,6 +59,8 @@ class IdentifyOptions:
     dark_density: float = 0.35  # points on a dark board's faces at most, of those on faces seen well
     free_sites: int = 1500  # interior samples of a candidate tested for see-through
     max_free: float = 0.25  # candidates with a larger share of see-through interior are dropped
+    thick: float = 1 / 20  # deeper than this, a row of compartments may look like one board
+    max_free_thick: float = 0.02  # ... and is one if more of its interior was seen through
     least_explained: float = 0.7  # share of the surface; stereo's fringe leaves a good model with .8 or more
     selection: str = "exact"  # or "annealing", as in the paper, for comparison
     solver_nodes: int = 20_000  # of the search tree; a limit in seconds would give other boards on a busy machine

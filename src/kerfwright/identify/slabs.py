@@ -124,7 +124,7 @@ def _bars(scene: _Scene, known: list[Slab]) -> list[Slab]:
         if any(all(_holds(scene, slab, end) for end in ends) for slab in known) or _is_parted(scene, bar, ends, known):
             continue
         free = _free_share(scene, bar.world_from_board, bar.thickness.value, bar.region)
-        if free <= scene.options.max_free:
+        if free <= scene.most_free(bar.thickness.value):
             found.append(Slab(bar.world_from_board, bar.thickness, bar.region, (), (), free))
     return found
 
@@ -239,6 +239,11 @@ class _Scene:
     def thickness_limits(self) -> tuple[float, float]:
         return self.options.min_thickness * self.diameter, self.options.max_thickness * self.diameter
 
+    def most_free(self, thickness: float) -> float:
+        """Largest share of a slab's interior that may have been seen through."""
+        deep = thickness > self.options.thick * self.diameter
+        return self.options.max_free_thick if deep else self.options.max_free
+
     @property
     def fringe(self) -> float:
         """How far stereo may widen a silhouette, mm."""
@@ -295,6 +300,7 @@ def _looked_at(scene: _Scene, seed: _Seed) -> Known:
     opposite = from_opposite(frame, piece, scene.planes, cloud.points, (low, high), scene.options.opposite_degrees)
     rim = trace_rim(frame, piece, cloud, around, scene.diameter / 40, spacing=scene.rim_spacing, width=scene.fringe)
     photos = from_photos(frame, rim, scene.photos, (low, high), step=scene.diameter * scene.options.sweep_step)
+    opposite, photos = ([h for h in side if not _is_air(scene, frame, piece, h)] for side in (opposite, photos))
     found = [sharpened(h, photos) for h in opposite] or [
         p for p in photos[:2] if p.support > max(CLEAR, 0.7 * photos[0].support)
     ]
@@ -305,6 +311,15 @@ def _looked_at(scene: _Scene, seed: _Seed) -> Known:
     if level and not _ends_above(photos, height) and reaches_ground(frame, piece, cloud, around, height):
         found.append(ThicknessHypothesis(float(height), 2 * around.noise, "ground", piece.area))
     return Known(top, frame, piece, rim, tuple(found), shown=tuple(photos))
+
+
+def _is_air(scene: _Scene, frame: np.ndarray, piece: Polygon, thickness: ThicknessHypothesis) -> bool:
+    """Whether a thickness reaches through compartments to the next board: cameras saw into what would be wood."""
+    if thickness.value <= scene.options.thick * scene.diameter:
+        return False
+    board = frame.copy()
+    board[:3, 3] -= thickness.value * frame[:3, 2]
+    return _free_share(scene, board, thickness.value, piece) > scene.options.max_free_thick
 
 
 def _above_floor(guess: ThicknessHypothesis, frame: np.ndarray, scene: _Scene) -> ThicknessHypothesis:
@@ -341,7 +356,7 @@ def _slabs(
         if piece.intersection(seed).area < 0.5 * seed.area:
             continue
         slab = Slab(board, thickness, piece, top, bottom, _free_share(scene, board, thickness.value, piece))
-        if slab.cut_ratio <= scene.options.cut_area_ratio and slab.free_share <= scene.options.max_free:
+        if slab.cut_ratio <= scene.options.cut_area_ratio and slab.free_share <= scene.most_free(thickness.value):
             slabs.append(slab)
     return slabs
 
