@@ -1,6 +1,6 @@
 """Seams between boards that were seen as one: pieces, segments, contacts."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from shapely.geometry import box
 
 from clouds import sheet
 from kerfwright.assemble.discontinuity import Discontinuity
-from kerfwright.assemble.face_seams import _crosses_all, _known_lines, _partner
+from kerfwright.assemble.face_seams import _crosses_all, _known_lines, _partner, seams_of_face
 from kerfwright.assemble.splits import (
     SeamLine,
     _apart,
@@ -108,7 +108,7 @@ def stepping(strength: float, side: float, views: int = 6) -> ToneSteps:
     offsets = np.arange(0.0, 300.0)
     values = np.where(np.abs(offsets - 100) < 2, strength, 0.5)
     line = side * np.ones((300, 3))
-    return ToneSteps(offsets, values, line, line, [], line, np.zeros((views, 300, 8, 3)))
+    return ToneSteps(offsets, values, line, line, [], line, np.zeros((views, 300, 8, 3)), [], np.zeros(300))
 
 
 def test_boards_step_to_the_same_side_on_both_faces():
@@ -144,6 +144,41 @@ def test_a_doubtful_seam_leaves_no_narrow_strip():
     assert offsets == [100, 200]
     certain = SeamLine(ACROSS, 280.0, np.array([280.0, 0]), np.array([280.0, 100]), 20.0, 6)
     assert len(_wide_enough(WIDE, ACROSS, [seam(100), seam(200), certain])) == 3
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A change at 100 mm that looks like a joint's at some offsets only."""
+
+    good: tuple[int, ...]
+    beside: tuple[int, ...] = (100,)
+    offsets = np.arange(300.0)
+    strength = np.where(np.arange(300) == 100, 9.0, 1.0)
+    sharp = False
+
+    def around(self, _k: int) -> tuple[int, ...]:
+        return self.beside
+
+    def along(self, k: int) -> float:
+        return 0.9 if k in self.good else 0.2
+
+    def unbroken(self, k: int) -> bool:
+        return k in self.good
+
+    def views(self, k: int) -> list[float]:
+        return [1.0] * (6 if k in self.good else 1)
+
+    def located(self, k: int) -> float:
+        return float(self.offsets[self.beside[-1]])
+
+
+@pytest.mark.parametrize(("asked", "found"), [
+    (Asked(good=(100,)), [100]), (Asked(good=(104,)), []), (Asked(good=(104,), beside=(100, 104)), [104]),
+    (Asked(good=(100,), beside=(100, 104)), [104]), (Asked(good=(), beside=(100, 104)), []),
+])  # fmt: skip
+def test_a_joint_is_asked_for_its_looks_where_it_lies_or_where_it_is_strongest(asked, found):
+    seams = seams_of_face(WIDE, ACROSS, asked, [], 500.0, 5.0)
+    assert [(s.offset, s.views, s.along) for s in seams] == [(at, 6, 0.9) for at in found]
 
 
 def test_lines_of_a_board_underneath_are_known_from_above_too():

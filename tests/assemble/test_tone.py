@@ -6,7 +6,7 @@ from scipy.ndimage import gaussian_filter, gaussian_filter1d
 
 from kerfwright.assemble.splits import LEAST_STRENGTH
 from kerfwright.assemble.texture import STRIP, FaceStrips
-from kerfwright.assemble.tone import ToneSteps, runs_along_grain, tone_steps
+from kerfwright.assemble.tone import ToneSteps, _unrest, runs_along_grain, tone_steps
 
 COUNT, STRIPS, SEAM = 400, 80, 210
 REDDER = np.array([0.002, -0.001, -0.006])  # less than a grey level
@@ -92,6 +92,36 @@ def test_a_step_that_varies_along_the_line_counts_for_less():
 
 def test_smears_of_jpeg_do_not_hide_a_joint():
     assert stands(with_tone(gaussian_filter1d(JOINT, 3)))
+
+
+def test_a_joint_told_by_its_broad_windows_lies_where_a_line_does():
+    colours = with_tone(gaussian_filter1d(JOINT, 3))
+    strips = FaceStrips(U * 0.5, np.arange(STRIPS) * 6.0, colours)
+    lines = np.where(np.abs(U - SEAM - 6) < 2, 60.0, 1.0)
+    plain, lined = tone_steps(strips), tone_steps(strips, lines)
+    assert plain.located(SEAM) == pytest.approx(0.5 * SEAM, abs=1.0)
+    assert lined.located(SEAM) > plain.located(SEAM) + 1
+    assert lined.around(SEAM) == (SEAM, round(2 * lined.located(SEAM)))
+
+
+def test_a_step_counts_for_less_among_restless_wood():
+    """The same joint, and hue that comes and goes, once far from the joint and once beside it."""
+    rng = np.random.default_rng(5)
+    hue = 0.4 * gaussian_filter1d(rng.standard_normal(COUNT), 6)
+    hue /= hue.std()
+    apart = np.abs(U - SEAM)
+    near, far = (0.5 * hue * where for where in ((apart > 40) & (apart < 110), (apart > 110)))
+    beside, away = (measured(with_tone(JOINT + h))[0].strength[SEAM] for h in (near, far))
+    assert beside < 0.8 * away
+
+
+def test_unrest_is_what_both_sides_have():
+    strength = np.where(U < 200, 1.0, 5.0)
+    unrest = _unrest(strength)
+    usual = np.median(strength)
+    assert unrest[20] == pytest.approx(1 / usual) and unrest[380] == pytest.approx(5 / usual)
+    assert unrest[199] == pytest.approx(3 / usual, rel=0.05)
+    assert _unrest(np.where(U < 200, 1.0, np.nan))[180] == pytest.approx(1)  # only one side is seen
 
 
 def test_tone_is_asked_for_along_the_grain_only():

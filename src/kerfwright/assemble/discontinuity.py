@@ -73,6 +73,10 @@ class Discontinuity:
         weight = np.maximum(np.nan_to_num(self.strength[near]) - 1, 1e-9)
         return float(self.offsets[near] @ weight / weight.sum())
 
+    def around(self, k: int) -> tuple[int, ...]:
+        """Where a joint that is strongest at offset k may be asked for its looks: there only, as lines are narrow."""
+        return (k,)
+
     def views(self, k: int) -> list[float]:
         """Share of the change at offset k that each view shows; views that do not show the offset are left out."""
         low = max(0, k - REACH)

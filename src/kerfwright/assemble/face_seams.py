@@ -51,7 +51,7 @@ def seams_of_face(
     margin = NARROWEST * diameter
     known = _known_lines(sheet, m, beside)
     places = _seam_places(change, ring @ m, margin, least)
-    seams = [_seam(change, k, m, ring, diameter) for k in places]
+    seams = [_seam(change, *place, m, ring, diameter) for place in places]
     return [
         s for s in seams
         if all(abs(s.offset - other) > KNOWN * diameter for other in known)
@@ -59,8 +59,10 @@ def seams_of_face(
     ]
 
 
-def _seam_places(change: Change, across: np.ndarray, margin: float, least: float) -> list[int]:
-    """Offsets whose change is strong, runs along the whole line, shows in the views, and is the strongest near by."""
+def _seam_places(change: Change, across: np.ndarray, margin: float, least: float) -> list[tuple[int, int]]:
+    """Offsets whose change is strong and the strongest near by, each with one close to it at which it runs along the
+    whole line and shows in the views.
+    """
     strength = np.nan_to_num(change.strength)
     inner = (change.offsets > across.min() + margin) & (change.offsets < across.max() - margin)
     reach = round(margin / (change.offsets[1] - change.offsets[0]) * SEPARATE)
@@ -68,7 +70,11 @@ def _seam_places(change: Change, across: np.ndarray, margin: float, least: float
         int(k) for k in np.flatnonzero(inner & (strength > least))
         if strength[k] == strength[max(0, k - reach) : k + reach + 1].max()
     ]
-    return [k for k in peaks if change.along(k) >= LEAST_ALONG and change.unbroken(k) and _agreed(change.views(k))]
+    return [(k, shown[0]) for k in peaks if (shown := [j for j in change.around(k) if _looks_so(change, j)])]
+
+
+def _looks_so(change: Change, k: int) -> bool:
+    return change.along(k) >= LEAST_ALONG and change.unbroken(k) and _agreed(change.views(k))
 
 
 def _agreed(shares: list[float]) -> bool:
@@ -80,15 +86,17 @@ def _showing(shares: list[float]) -> int:
     return sum(share > LEAST_ALONG for share in shares)
 
 
-def _seam(change: Change, k: int, m: np.ndarray, ring: np.ndarray, diameter: float) -> SeamLine:
-    """The seam at a peak: its middle, ends on the outline's box, and the gap where eased edges show as two lines."""
+def _seam(change: Change, k: int, shown: int, m: np.ndarray, ring: np.ndarray, diameter: float) -> SeamLine:
+    """The seam at a peak k, as shown at the offset beside: its middle, ends on the outline's box, and the gap where
+    eased edges show as two lines.
+    """
     along, strength = ring @ np.array([-m[1], m[0]]), np.nan_to_num(change.strength)
     step = float(change.offsets[1] - change.offsets[0])
     apart = step * _partner(strength, k, EASED * diameter / step) if change.sharp else 0.0
     at = change.located(k) + apart / 2
     start, end = at * m + np.array([[along.min()], [along.max()]]) * np.array([-m[1], m[0]])
-    told, gap = (float(strength[k]), _showing(change.views(k))), abs(apart) * GAP_SHARE
-    return SeamLine(m, at, start, end, *told, gap, change.along(k), not change.sharp)
+    told, gap = (float(strength[k]), _showing(change.views(shown))), abs(apart) * GAP_SHARE
+    return SeamLine(m, at, start, end, *told, gap, change.along(shown), not change.sharp)
 
 
 def _partner(strength: np.ndarray, k: int, reach: float) -> float:

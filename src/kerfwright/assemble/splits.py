@@ -79,7 +79,7 @@ class SeamSearch:
     def _unexpected(self, m: np.ndarray, strips: list[FaceStrips | None]) -> list[SeamLine]:
         """Seams square to m that lines and steps of tone tell of, where no geometry expects one."""
         changes = [s and discontinuity(s) for s in strips]
-        steps = [s and tone_steps(s) for s in strips]
+        steps = [s and tone_steps(s, c and c.strength) for s, c in zip(strips, changes, strict=True)]
         along = [s is not None and runs_along_grain(s) for s in strips]
         tones = _on_either_face(self, m, [t if a else None for t, a in zip(steps, along, strict=True)], LEAST_TONE)
         tones = [t for t in tones if not any(c and _is_late_wood(t, c, self.diameter) for c in changes)]

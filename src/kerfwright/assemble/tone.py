@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.ndimage import correlate1d, minimum_filter1d
 
 from kerfwright.assemble.discontinuity import (
@@ -24,6 +25,7 @@ from kerfwright.assemble.discontinuity import (
     pressed_mean,
     step_kernel,
 )
+from kerfwright.assemble.ring_break import step_evidence
 from kerfwright.assemble.texture import STRIP, FaceStrips
 
 __all__ = ["ToneSteps", "runs_along_grain", "tone_steps"]
@@ -36,13 +38,19 @@ SUDDEN = ((0.55, 1.6), (0.75, 1.6))  # of the broadest window's step that the ot
 STEEP = 0.9  # of the second window: no slope, whatever a single ring in the narrowest does
 BEYOND = (30, 26)  # samples: the narrowest board is hardly wider than both, and has one tone so far
 LASTS = (0.45, 1.7)  # of the step, that must be there still; less is a band of late wood, an even slope has 2.2
-NEAR = 8  # samples from the strongest place to the best one, and from there to what counts for its middle
-MIDDLE = 0.6  # of the best place's, which others must have to count for its middle
+NARROW = (2, 6)  # one more window that tells where a step lies
+BREAK = 3.0  # how much the rings' break counts for its place, against one window
+LINES = 20.0  # how much a line's strength does
+FROM_PEAK = 12  # samples from the strongest place to the best one
+NEAR = 8  # samples from there to what counts for its middle
+MIDDLE = 0.7  # of the best place's, which others must have to count for its middle
 STRETCHES = 16  # of the line, whose steps are compared
 INDEPENDENT = 4.0  # of them: grain runs on from one into the next
 CLIP = 2.5  # robust deviations of stretches: a knot does not set the measure
 USUAL = 0.7  # share of the offsets that set the measure; at others may be seams or shadows
 ROUNDS = 8
+BESIDE = (36, 130)  # samples from a step, between which the wood on either side tells how much it varies there
+LEAST_BESIDE = 16  # samples of them that must tell
 CHI2_MEDIAN = 2.366  # of three degrees of freedom
 SCALE = 7 / 23  # to the strengths of `discontinuity`; 30 made single boards (seeds from 1000) had 3.4 at most
 SHADED = 4.3  # strength of a step of light worth asking whether it slopes
@@ -61,6 +69,9 @@ class ToneSteps:
     flats: list[np.ndarray]  # (U, C, 3) of every window and strip
     profile: np.ndarray  # (U, 3) log brightness along m, of all views and strips
     colours: np.ndarray  # (V, U, C, 3) of every view
+    place: list[tuple[np.ndarray, np.ndarray]]  # steps (U, 3) of every window that tells the place, and (3, 3) the
+    # inverse of their usual covariance
+    signs: np.ndarray  # (U,) what else tells the place: how much a step breaks the rings, and lines
 
     sharp: bool = False
     denied: float = 1.7  # strength on the other face, below which no joint goes through
@@ -113,15 +124,22 @@ class ToneSteps:
         return float(step @ self.weight[k] / (self.line[k] @ self.weight[k]))
 
     def located(self, k: int) -> float:
-        """Offset of the place near offset k that parts the two tones best, mm."""
-        steps = [np.nan_to_num(pressed_mean(flat)) @ self.weight[k] for flat in self.flats]
-        side = np.sign(steps[-1][k])
-        fit = sum((np.maximum(side * step, 0) / _deviation(step)) ** 2 for step in steps)
-        low = max(0, k - NEAR)
-        best = low + int(np.argmax(fit[low : k + NEAR + 1]))
+        """Offset of the place near offset k that parts the two tones best, mm: by windows, narrow ones, too, each of
+        which weighs colours by what they usually do over its width, by what breaks the rings, and by lines.
+        """
+        fit = self.signs
+        for step, weigh in self.place:
+            told = step @ (weigh @ self.line[k])
+            fit = fit + (np.maximum(np.nan_to_num(told), 0) / _deviation(told[np.isfinite(told)])) ** 2
+        low = max(0, k - FROM_PEAK)
+        best = low + int(np.argmax(fit[low : k + FROM_PEAK + 1]))
         near = slice(max(0, best - NEAR), best + NEAR + 1)
         counts = np.maximum(fit[near] - MIDDLE * fit[best], 0)
         return float(self.offsets[near] @ counts / counts.sum())
+
+    def around(self, k: int) -> tuple[int, ...]:
+        """Where a joint that is strongest at offset k may be asked for its looks: broad windows put it a ring off."""
+        return k, int(np.abs(self.offsets - self.located(k)).argmin())
 
     def views(self, k: int) -> list[float]:
         """Share of the step at offset k that each view shows; views that do not show the offset are left out."""
@@ -137,8 +155,11 @@ class ToneSteps:
         return float(pressed_mean(strips[None])[0] @ self.weight[k] / (self.line[k] @ self.weight[k]))
 
 
-def tone_steps(strips: FaceStrips) -> ToneSteps | None:
-    """The steps of tone across lines square to m; None when hardly anything was seen."""
+def tone_steps(strips: FaceStrips, lines: np.ndarray | None = None) -> ToneSteps | None:
+    """The steps of tone across lines square to m; None when hardly anything was seen.
+
+    lines : (U,) strength of lines at the same offsets, which tell better where a step lies.
+    """
     edge = round(EDGE * len(strips.middles))
     colours = strips.colours[:, :, edge : len(strips.middles) - edge]
     if colours.shape[2] < STRETCHES:
@@ -154,7 +175,11 @@ def tone_steps(strips: FaceStrips) -> ToneSteps | None:
         step, counts = _weighed(flat[good])
         total = total + np.einsum("ui,ui->u", step, counts)
     strength[good], line[good], weight[good] = SCALE * total, step, counts
-    return ToneSteps(strips.offsets, strength, line, weight, flats, pressed_mean(mean), colours)
+    strength /= 0.5 + 0.5 * _unrest(strength)
+    profile = pressed_mean(mean)
+    place = [_placed(pressed_mean(flat)) for flat in (_stepped(mean, NARROW), *flats)]
+    signs = BREAK * step_evidence(profile) + (0.0 if lines is None else LINES * np.nan_to_num(lines))
+    return ToneSteps(strips.offsets, strength, line, weight, flats, profile, colours, place, signs)
 
 
 def runs_along_grain(strips: FaceStrips) -> bool:
@@ -193,6 +218,27 @@ def _weighed(flat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     between = np.einsum("usi,usj->uij", away, away) / STRETCHES / INDEPENDENT
     spread = _usual(step) + between + FAINTEST**2 * np.eye(3)
     return step, np.linalg.solve(spread, step[..., None])[..., 0]
+
+
+def _unrest(strength: np.ndarray) -> np.ndarray:
+    """(U,) how much the wood on both sides of every offset changes by itself, against the whole face: boards of a panel
+    are not alike in that, and a board is quiet where its rings stand upright. It is known from few rings, hence only
+    half believed.
+    """
+    near, far = BESIDE
+    padded = np.pad(strength, far, constant_values=np.nan)
+    windows = sliding_window_view(padded, far - near + 1)  # the k-th starts at offset k - far
+    told = np.isfinite(windows).sum(axis=1) >= LEAST_BESIDE
+    usual = np.full(len(windows), np.nan)
+    usual[told] = np.nanmedian(windows[told], axis=1)
+    sides = np.stack([usual[: len(strength)], usual[far + near :]]) / (np.nanmedian(strength) + 1e-12)
+    known = np.isfinite(sides)
+    return np.where(known.any(axis=0), np.nansum(sides, axis=0) / np.maximum(known.sum(axis=0), 1), 1.0)
+
+
+def _placed(step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Steps (U, 3) of a window, and the inverse (3, 3) of what is usual for them."""
+    return step, np.linalg.inv(_usual(step[np.isfinite(step[:, 0])]) + FAINTEST**2 * np.eye(3))
 
 
 def _usual(step: np.ndarray) -> np.ndarray:
