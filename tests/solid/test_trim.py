@@ -102,6 +102,19 @@ def test_an_outline_that_trimming_would_lead_through_a_hole_is_left():
     assert not {f.code for f in check(trimmed)} & {"K105", "K106", "K109"}
 
 
+def test_a_slit_into_which_something_reaches_is_not_bridged():
+    """A wedge 2 mm wide at its mouth, and a fin of .02 mm from below in it: the bridge would cross the fin."""
+    slit = [(99.0, 0.0), (100.0, 45.0), (101.0, 0.0)]
+    fin = [(100.01, -20.0), (100.01, 43.0), (99.99, 43.0), (99.99, -20.0)]
+    around = [(95.0, -20.0), (95.0, -30.0), (150.0, -30.0), (150.0, 80.0), (0.0, 80.0)]
+    outline = [(0.0, 0.0), *slit, (120.0, 0.0), (120.0, -20.0), *fin, *around]
+    model = Model(boards=(board(outline),))
+    assert fitted_together(model).boards == model.boards
+    assert not {f.code for f in check(model)} & {"K105", "K106", "K109"}
+    free = Model(boards=(board([p for p in outline if p not in fin]),))
+    assert len(fitted_together(free).boards[0].cut_path.outer.edges) == len(outline) - len(fin) + 1
+
+
 def test_only_what_lies_in_a_neighbour_is_cut_off():
     """A curved end runs .2 mm into a post beside which the board goes on."""
     bulge = Bezier(start=(200, 0), control_1=(200.3, 30), control_2=(200.3, 70), end=(200, 100))
