@@ -1,5 +1,6 @@
 """Contacts on a photographed shelf, and on boards without photographs."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -121,3 +122,30 @@ def test_a_sliver_of_a_joint_does_not_decide_a_corner():
     short, side = sheet("shelf", pose((0, 0, 200)), 18.0, spur), upright("side", -150, 217)
     (found,) = decided_without_photos(short, side)
     assert (found.joint.b, found.evidence.decided_by) == (0, "geometry")
+
+
+def leg_and_rail(rail_seen: bool):
+    """A leg 50 wide and 218 high, and a rail of 50 by 150 whose unseen face is level with the leg's edge."""
+    leg = sheet("leg", pose((0, 0, 0), (0, 1, 0), (0, 0, 1)), 10.0, (0, 0, 50, 218))
+    frame = pose((10, 50, 168), (1, 0, 0), (0, 0, 1))
+    return leg, sheet("rail", frame, 30.0, (0, 0, 150, 50), thickness_seen=rail_seen)
+
+
+@pytest.mark.parametrize(("rail_seen", "kind"), [(True, 2), (False, 1)])
+def test_no_seam_cuts_a_notch_into_a_leg(monkeypatch, rail_seen, kind):
+    """The leg goes on beside the rail: it does not end there, however clear a line runs along the rail's face."""
+    boards = leg_and_rail(rail_seen)
+    monkeypatch.setattr(contacts, "look_for_seam", lambda _, joint, *__: Seam(9.0 if joint.a == 1 else 1.4, 9))
+    (found,) = decided_without_photos(*boards)
+    contact = to_contact(found, boards)
+    assert (contact.type, contact.a, contact.b) == (kind, "leg", "rail")
+    assert contact.evidence.decided_by == "geometry"
+
+
+def test_a_leg_that_has_a_notch_already_ends_there(monkeypatch):
+    """Where the cloud shows no wood beyond the rail's face, the seam decides as ever."""
+    leg, rail = leg_and_rail(True)
+    leg = replace(leg, region=leg.region.difference(box(20, 168, 50, 218)))
+    monkeypatch.setattr(contacts, "look_for_seam", lambda _, joint, *__: Seam(9.0 if joint.a == 1 else 1.4, 9))
+    (found,) = decided_without_photos(leg, rail)
+    assert to_contact(found, (leg, rail)).a == "rail"

@@ -11,6 +11,7 @@ import numpy as np
 from kerfwright.assemble.decided import Decided, swapped
 from kerfwright.assemble.flush_ends import flush_end
 from kerfwright.assemble.mitres import EndFace, corner_lines, look_for_mitre, mitred, overlapping
+from kerfwright.assemble.notches import is_notch
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.assemble.severing import without_severing
 from kerfwright.capture.types import Cloud
@@ -139,6 +140,9 @@ def _corner(scene: Scene, first: Joint, second: Joint, before: Decided | None) -
         joints = (first, second) if first.length > second.length else (second, first)
         return Decided(joints[0], 2, joints[1], ContactEvidence())
     seams = [_seam(scene, j, _outer_face(scene, j)) for j in (first, second)]
+    notches = [is_notch(scene.sheets, j, scene.mm(scene.options.min_contact) / 4) for j in (first, second)]
+    if notches[0] != notches[1]:
+        return _without_notch(scene, (first, second), seams, notches.index(False))
     chosen = 0 if seams[0].score >= seams[1].score else 1
     margin = seams[chosen].score / max(seams[1 - chosen].score, 1e-6)
     evidence = ContactEvidence(
@@ -148,6 +152,19 @@ def _corner(scene: Scene, first: Joint, second: Joint, before: Decided | None) -
     joints = (first, second)
     corner = Decided(joints[chosen], 2, joints[1 - chosen], evidence, _end_face(scene, first, second, seams))
     return _mitre(scene, corner, "seam") if seams[chosen].score < LEAST_SEAM and _shows_mitre(corner) else corner
+
+
+def _without_notch(scene: Scene, joints: tuple[Joint, Joint], seams: list[Seam], chosen: int) -> Decided:
+    """The corner at which only one board can end without a notch in the other; none at all where the other seems to end
+    beside it only by a face that nobody saw.
+    """
+    joint, other = joints[chosen], joints[1 - chosen]
+    if other.face_a == "top" and not scene.sheets[other.a].thickness_seen:
+        return Decided(joint, 1, None, ContactEvidence())
+    evidence = ContactEvidence(
+        seam_score=seams[chosen].score, seam_score_other=seams[1 - chosen].score, views=seams[chosen].views,
+    )
+    return Decided(joint, 2, other, evidence)
 
 
 def _end_face(scene: Scene, first: Joint, second: Joint, seams: list[Seam]) -> EndFace | None:

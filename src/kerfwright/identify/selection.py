@@ -25,6 +25,7 @@ __all__ = ["Evidence", "Selection", "explained_share", "gather_evidence", "progr
 
 CUT_SHARE = 0.95  # worth of a place explained by a cut face, against 1 for a sheet plane
 BULKY = 0.5  # extra cost of a board whose cut surface reaches the most the five-times rule allows
+GUESSED = 0.5  # extra cost of a board whose thickness nothing shows
 SEEN_THROUGH = 2.0  # cost of see-through interior, in shares of the board's own surface
 
 
@@ -119,7 +120,7 @@ def _held_by(slab: Slab, slabs: list[Slab], count: int = 800) -> np.ndarray:
 
 def _cost(slab: Slab, by_sheet: np.ndarray, options: IdentifyOptions) -> float:
     bulk = BULKY * min(slab.cut_ratio / options.cut_area_ratio, 1.0)
-    unseen = 1.0 if slab.thickness.evidence in UNSEEN else 0.0
+    unseen = GUESSED if slab.thickness.evidence in UNSEEN else 0.0
     return options.board_cost * (1 + bulk + unseen) + SEEN_THROUGH * slab.free_share * float(by_sheet.mean())
 
 

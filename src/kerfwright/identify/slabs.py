@@ -274,6 +274,15 @@ class _Scene:
             if p.normal @ normal > cos and abs((p.centroid - point) @ normal) < tolerance
         )
 
+    def level_with_largest(self, numbers: tuple[int, ...]) -> tuple[int, ...]:
+        """Those of the primitives that lie on the plane of the largest: a rail set back from its legs is no part of
+        them, though a plane between the two is near both.
+        """
+        if not numbers:
+            return ()
+        largest = self.planes[max(numbers, key=lambda k: len(self.planes[k].point_idx))]
+        return tuple(k for k in self.coplanar(largest.normal, largest.centroid) if k in numbers)
+
     def points(self, numbers: tuple[int, ...]) -> np.ndarray:
         idx = np.concatenate([self.planes[k].point_idx for k in numbers]) if numbers else np.zeros(0, int)
         return self.capture.cloud.points[idx]
@@ -342,7 +351,7 @@ def _slabs(
 ) -> list[Slab]:
     """The slab's pieces that touch the seed region: points of both sheet planes, see-through places taken out."""
     bottom_point = frame[:3, 3] - thickness.value * frame[:3, 2]
-    bottom = scene.coplanar(-frame[:3, 2], bottom_point)
+    bottom = scene.level_with_largest(scene.coplanar(-frame[:3, 2], bottom_point))
     sides = [(scene.points(side) - frame[:3, 3]) @ frame[:3, :3] for side in (top, bottom)]
     raster = Raster.around(np.concatenate(sides)[:, :2], scene.cell)
     wood = np.zeros(raster.shape, bool)
