@@ -59,6 +59,14 @@ def test_a_side_traced_along_both_lines_of_an_eased_edge_is_one_line():
     assert [e.kind for e in path.outer.edges] == ["line"] * 4
 
 
+@pytest.mark.parametrize("inner", [lambda x: x > 170, lambda x: x < 130, lambda x: np.abs(x - 120) < 70])
+def test_where_a_side_was_traced_on_two_levels_the_board_ends_at_the_outer_one(inner):
+    path = fit_cut_path([stepped(lambda x: 1.9 * inner(x))])
+    assert [e.kind for e in path.outer.edges] == ["line"] * 4
+    lower = min(path.outer.edges, key=lambda e: e.start[1] + e.end[1])
+    assert (lower.start[1], lower.end[1]) == pytest.approx((0, 0), abs=0.15)
+
+
 @pytest.mark.parametrize("shift", [lambda x: 6.0 * (np.abs(x - 120) < 70), lambda x: 3 * (1 - ((x - 150) / 150) ** 2)])
 def test_high_steps_and_even_bows_stay(shift):
     edges = fit_cut_path([stepped(shift)]).outer.edges

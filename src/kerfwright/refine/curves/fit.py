@@ -113,7 +113,8 @@ def _fit_loop(loop: BoundaryLoop, guides: list[GuideLine], options: CurveOptions
     shape = first_shape(chain, samples, guides, options)
     fit = improve(solve(shape, samples, guides), samples, guides, options)
     fit, samples, bumps = without_bumps(fit, samples, guides, options)
-    fit = with_straight_edges(without_slivers(fit, samples, guides, options), samples, guides, options)
+    fit = without_slivers(fit, samples, guides, options)
+    fit, samples = with_straight_edges(fit, samples, guides, options)
     return _LoopFit(samples, fit, None, tuple(bumps))
 
 
