@@ -10,10 +10,14 @@ from clouds import shelf_capture, shelf_parts
 from kerfwright.assemble import AssembleOptions, backs, veils
 from kerfwright.assemble.backs import measured_backs
 from kerfwright.assemble.veils import still_open, unveiled
+from kerfwright.capture.types import Cloud
+from kerfwright.identify.faces import moved
+from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.photo_edges import Photos, SweepResult
 from kerfwright.model import Origin, Quantity
 
 OPTIONS = AssembleOptions()
+BLIND = FreeSpace((), (), 1.0, 1.0)
 
 
 def top_first():
@@ -48,7 +52,7 @@ def hidden_top():
 def test_a_hidden_face_lies_where_clearly_more_than_usual_show_an_edge(monkeypatch, shown, value, seen):
     monkeypatch.setattr(backs, "sweep_line", edge_at(18.0, shown))
     boards, capture = hidden_top(), shelf_capture()
-    found = measured_backs(boards, Photos(capture), capture.cloud.diameter, OPTIONS)[0]
+    found = measured_backs(boards, capture.cloud, Photos(capture), BLIND, OPTIONS)[0]
     assert found.thickness_seen == seen
     assert found.thickness.value == pytest.approx(value or boards[0].thickness.value, abs=0.15)
     tops = [(s.world_from_board @ [0, 0, s.thickness.value, 1])[2] for s in (found, boards[0])]
@@ -58,7 +62,30 @@ def test_a_hidden_face_lies_where_clearly_more_than_usual_show_an_edge(monkeypat
 def test_without_boards_on_it_a_hidden_face_stays_inferred():
     top = replace(top_first()[0], thickness_seen=False)
     capture = shelf_capture()
-    assert measured_backs((top,), Photos(capture), capture.cloud.diameter, OPTIONS) == (top,)
+    assert measured_backs((top,), capture.cloud, Photos(capture), BLIND, OPTIONS) == (top,)
+
+
+def test_a_board_that_ends_on_a_third_one_says_nothing_of_a_hidden_face(monkeypatch):
+    monkeypatch.setattr(backs, "sweep_line", edge_at(18.0, 0.7))
+    boards, capture = hidden_top(), shelf_capture()
+    beam = replace(moved(top_first()[0], -20.0), name="beam")
+    assert not measured_backs((*boards, beam), capture.cloud, Photos(capture), BLIND, OPTIONS)[0].thickness_seen
+
+
+def test_nor_does_one_whose_end_was_seen(monkeypatch):
+    monkeypatch.setattr(backs, "sweep_line", edge_at(18.0, 0.7))
+    (top, *uprights), capture = hidden_top(), shelf_capture()
+    points, normals, ended = [capture.cloud.points], [capture.cloud.normals], []
+    for upright in uprights:
+        ring = np.asarray(upright.region.exterior.coords)
+        xyz = upright.to_world(np.c_[ring, np.full(len(ring), 9)])
+        end = np.linspace(*xyz[xyz[:, 2] > xyz[:, 2].max() - 2][[0, -1]], 60)
+        first = sum(map(len, points))
+        ended.append(replace(upright, cut_idx=np.arange(first, first + len(end))))
+        points.append(end)
+        normals.append(np.tile([0.0, 0, 1], (len(end), 1)))
+    cloud = Cloud(np.concatenate(points), np.concatenate(normals))
+    assert not measured_backs((top, *ended), cloud, Photos(capture), BLIND, OPTIONS)[0].thickness_seen
 
 
 @pytest.mark.parametrize(("shown", "cut_back"), [(0.9, True), (0.4, False)])

@@ -66,7 +66,7 @@ def _with_hidden_faces(
     from kerfwright.identify.gaps import mended
     from kerfwright.identify.laid import laid_on
 
-    sheets = measured_backs(sheets, photos, cloud.diameter, options)
+    sheets = measured_backs(sheets, cloud, photos, free, options)
     sheets = backed_by_ends(mended(sheets, cloud, free, options), cloud.diameter, options)
     sheets = flush_neighbours(share_thickness(sheets, cloud.diameter, options), cloud.diameter, options)
     return laid_on(sheets, cloud, free, options)

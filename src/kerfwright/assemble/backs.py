@@ -10,11 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import shapely
 
 from kerfwright.assemble.options import AssembleOptions
+from kerfwright.capture.types import Cloud
 from kerfwright.identify.faces import with_thickness
+from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.joints import Joint, columns, face_plane, trace_of
 from kerfwright.identify.photo_edges import Photos, SweepResult, refine_peak
+from kerfwright.identify.reaching import Scene, end_is_seen
 from kerfwright.identify.seams import sweep_line
 from kerfwright.identify.types import Sheet
 from kerfwright.identify.visibility import Obstacles
@@ -25,6 +29,7 @@ __all__ = ["measured_backs"]
 STEP = 1 / 1600  # of D, between two offsets of the sweep
 LIKELY = (0.5, 2.0)  # of the thickness that most of the object has; a groove or an arris may lie beyond
 LEAST_LOOKS = 10  # views of all lines together
+MOST_ENDS = 0.5  # of a board's end that may lie at a third board: more, and it ends there
 CLEAR = 0.2  # share of stretches and views that show an edge there, beyond the share that show one anywhere
 
 
@@ -39,36 +44,35 @@ class _Window:
 
 
 def measured_backs(
-    sheets: tuple[Sheet, ...], photos: Photos, diameter: float, options: AssembleOptions
+    sheets: tuple[Sheet, ...], cloud: Cloud, photos: Photos, free: FreeSpace, options: AssembleOptions
 ) -> tuple[Sheet, ...]:
     """The sheets, those of unseen thickness as thick as the boards that end on their hidden face show."""
     out = list(sheets)
     for k, sheet in enumerate(sheets):
         if not sheet.thickness_seen:
             low, high = (share * sheet.thickness.value for share in LIKELY)
-            window = _Window(low, high, STEP * diameter, 2 * options.reach * diameter)
-            found = _hidden_face(k, sheets, photos, diameter, window, options)
+            window = _Window(low, high, STEP * cloud.diameter, 2 * options.reach * cloud.diameter)
+            found = _hidden_face(k, Scene(sheets, cloud, photos, Obstacles([], 1.0), free, options), window)
             if found is not None:
                 out[k] = replace(with_thickness(sheet, found), thickness_seen=True)
     return tuple(out)
 
 
-def _hidden_face(
-    a: int, sheets: tuple[Sheet, ...], photos: Photos, diameter: float, window: _Window, options: AssembleOptions
-) -> Quantity | None:
+def _hidden_face(a: int, scene: Scene, window: _Window) -> Quantity | None:
     """Depth of the hidden face below the top, where the edges of all boards that end there agree on one."""
+    sheets, options = scene.sheets, scene.options
     thin = Quantity(value=window.low, standard_error=window.low, origin=Origin.INFERRED)
-    scene = list(sheets)
-    scene[a] = with_thickness(sheets[a], thin)  # what is not known to be there must not hide anything
-    obstacles = Obstacles(scene, options.outline_error * diameter)
+    shown = list(sheets)
+    shown[a] = with_thickness(sheets[a], thin)  # what is not known to be there must not hide anything
+    obstacles = Obstacles(shown, scene.mm(options.outline_error))
     sweeps = []
     for b in range(len(sheets)):
-        joint = _towards(a, b, sheets, diameter, window, options) if b != a else None
-        if joint is not None:
-            faces = _facing(sheets[a], sheets[b], options.reach * diameter)
-            sweeps += [_sweep(sheets[b], joint, face, photos, obstacles, window) for face in faces]
+        joint = _towards(a, b, sheets, scene.diameter, window, options) if b != a else None
+        if joint is not None and not end_is_seen(scene, joint) and not _ends_elsewhere(scene, joint):
+            faces = _facing(sheets[a], sheets[b], scene.mm(options.reach))
+            sweeps += [_sweep(sheets[b], joint, face, scene.photos, obstacles, window) for face in faces]
     sweeps = [s for s in sweeps if s is not None]
-    return _agreed(sweeps, window, options) if sweeps else None
+    return _agreed(sweeps, window) if sweeps else None
 
 
 def _towards(
@@ -84,7 +88,27 @@ def _towards(
     if own.sum() * diameter / 200 < window.shortest:
         return None
     interval = (float(along[own].min()), float(along[own].max()))
-    return Joint(a, b, "top", trace, (interval,), float(np.median(first[own])), np.zeros((0, 2)))
+    ends = trace.place(first[own], along[own])
+    return Joint(a, b, "top", trace, (interval,), float(np.median(first[own])), ends)
+
+
+def _ends_elsewhere(scene: Scene, joint: Joint) -> bool:
+    """Whether b comes near a because it ends on a third board there, which says nothing of a: as a rail that ends on a
+    leg does, beside the one that ends on the leg's inner face.
+    """
+    board, slack = scene.sheets[joint.b], scene.mm(scene.options.outline_error)
+    places = board.to_world(np.c_[joint.ends, np.full(len(joint.ends), board.thickness.value / 2)])
+    return any(
+        _near_wood(places, other, slack).mean() > MOST_ENDS
+        for k, other in enumerate(scene.sheets) if k not in (joint.a, joint.b)
+    )
+
+
+def _near_wood(places: np.ndarray, sheet: Sheet, slack: float) -> np.ndarray:
+    """(N,) which places lie in a board or as near to it as its outline is uncertain."""
+    x = sheet.to_board(places)
+    level = (x[:, 2] > -slack) & (x[:, 2] < sheet.thickness.value + slack)
+    return level & shapely.contains_xy(sheet.region.buffer(slack), x[:, 0], x[:, 1])
 
 
 def _facing(a: Sheet, b: Sheet, reach: float) -> list[str]:
@@ -101,7 +125,7 @@ def _sweep(
     return sweep_line(board, joint, face, photos, obstacles, window.low, window.high, window.step)
 
 
-def _agreed(sweeps: list[SweepResult], window: _Window, options: AssembleOptions) -> Quantity | None:
+def _agreed(sweeps: list[SweepResult], window: _Window) -> Quantity | None:
     """The offset at which all sweeps together are strongest."""
     weight = np.array([s.views for s in sweeps], float)
     strength = np.average([s.strength / np.median(s.strength) for s in sweeps], axis=0, weights=weight)
