@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import shapely
 
 from kerfwright.assemble.options import AssembleOptions
 from kerfwright.capture.types import Cloud
@@ -18,7 +17,7 @@ from kerfwright.identify.faces import with_thickness
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.joints import Joint, columns, face_plane, trace_of
 from kerfwright.identify.photo_edges import Photos, SweepResult, refine_peak
-from kerfwright.identify.reaching import Scene, end_is_seen
+from kerfwright.identify.reaching import Scene, end_is_seen, ends_elsewhere
 from kerfwright.identify.seams import sweep_line
 from kerfwright.identify.types import Sheet
 from kerfwright.identify.visibility import Obstacles
@@ -29,7 +28,6 @@ __all__ = ["measured_backs"]
 STEP = 1 / 1600  # of D, between two offsets of the sweep
 LIKELY = (0.5, 2.0)  # of the thickness that most of the object has; a groove or an arris may lie beyond
 LEAST_LOOKS = 10  # views of all lines together
-MOST_ENDS = 0.5  # of a board's end that may lie at a third board: more, and it ends there
 CLEAR = 0.2  # share of stretches and views that show an edge there, beyond the share that show one anywhere
 
 
@@ -68,7 +66,7 @@ def _hidden_face(a: int, scene: Scene, window: _Window) -> Quantity | None:
     sweeps = []
     for b in range(len(sheets)):
         joint = _towards(a, b, sheets, scene.diameter, window, options) if b != a else None
-        if joint is not None and not end_is_seen(scene, joint) and not _ends_elsewhere(scene, joint):
+        if joint is not None and not end_is_seen(scene, joint) and not ends_elsewhere(scene, joint):
             faces = _facing(sheets[a], sheets[b], scene.mm(options.reach))
             sweeps += [_sweep(sheets[b], joint, face, scene.photos, obstacles, window) for face in faces]
     sweeps = [s for s in sweeps if s is not None]
@@ -90,25 +88,6 @@ def _towards(
     interval = (float(along[own].min()), float(along[own].max()))
     ends = trace.place(first[own], along[own])
     return Joint(a, b, "top", trace, (interval,), float(np.median(first[own])), ends)
-
-
-def _ends_elsewhere(scene: Scene, joint: Joint) -> bool:
-    """Whether b comes near a because it ends on a third board there, which says nothing of a: as a rail that ends on a
-    leg does, beside the one that ends on the leg's inner face.
-    """
-    board, slack = scene.sheets[joint.b], scene.mm(scene.options.outline_error)
-    places = board.to_world(np.c_[joint.ends, np.full(len(joint.ends), board.thickness.value / 2)])
-    return any(
-        _near_wood(places, other, slack).mean() > MOST_ENDS
-        for k, other in enumerate(scene.sheets) if k not in (joint.a, joint.b)
-    )
-
-
-def _near_wood(places: np.ndarray, sheet: Sheet, slack: float) -> np.ndarray:
-    """(N,) which places lie in a board or as near to it as its outline is uncertain."""
-    x = sheet.to_board(places)
-    level = (x[:, 2] > -slack) & (x[:, 2] < sheet.thickness.value + slack)
-    return level & shapely.contains_xy(sheet.region.buffer(slack), x[:, 0], x[:, 1])
 
 
 def _facing(a: Sheet, b: Sheet, reach: float) -> list[str]:

@@ -18,7 +18,7 @@ from kerfwright.capture.types import Cloud
 from kerfwright.identify.freespace import FreeSpace
 from kerfwright.identify.joints import Joint, end_on, face_plane
 from kerfwright.identify.photo_edges import Photos
-from kerfwright.identify.reaching import LEAST_VIEWS, Scene, end_is_seen, goes_on_unseen, shown_end
+from kerfwright.identify.reaching import LEAST_VIEWS, Scene, end_is_seen, ends_elsewhere, goes_on_unseen, shown_end
 from kerfwright.identify.seams import Seam, look_for_seam
 from kerfwright.identify.types import Sheet
 from kerfwright.identify.visibility import Obstacles
@@ -86,9 +86,9 @@ def _all_joints(scene: Scene, known: set[tuple[int, int]]) -> tuple[_Joints, _Jo
     near, far, doubtful = {}, {}, {}
     pairs = [(a, b) for a in range(len(scene.sheets)) for b in range(len(scene.sheets)) if a != b]
     for a, b in pairs:
-        joint = end_on(scene.sheets, a, b, scene.search(scene.options.outline_error))
+        joint = _told(scene, end_on(scene.sheets, a, b, scene.search(scene.options.outline_error)))
         if joint is None:
-            maybe = end_on(scene.sheets, a, b, scene.search(scene.options.unseen_reach))
+            maybe = _told(scene, end_on(scene.sheets, a, b, scene.search(scene.options.unseen_reach)))
             if maybe is not None and maybe.gap <= scene.mm(scene.options.reach):
                 doubtful[a, b] = maybe
         elif joint.gap > scene.mm(scene.options.reach):
@@ -100,6 +100,13 @@ def _all_joints(scene: Scene, known: set[tuple[int, int]]) -> tuple[_Joints, _Jo
         if key in known or _is_contact(scene, j, near.get(key[::-1]) or far.get(key[::-1]))
     }
     return near, far, doubtful
+
+
+def _told(scene: Scene, joint: Joint | None) -> Joint | None:
+    """The joint, unless it is one on a face of which nobody knows where it is, by a board that ends on a third one."""
+    if joint is None or joint.face_a == "top" or scene.sheets[joint.a].thickness_seen:
+        return joint
+    return None if ends_elsewhere(scene, joint) else joint
 
 
 def _is_contact(scene: Scene, joint: Joint, reverse: Joint | None) -> bool:

@@ -22,10 +22,13 @@ from kerfwright.identify.seams import End, look_for_end
 from kerfwright.identify.types import Sheet
 from kerfwright.identify.visibility import Obstacles
 
-__all__ = ["LEAST_VIEWS", "Scene", "end_is_seen", "goes_on_unseen", "may_reach", "shown_end"]
+__all__ = [
+    "LEAST_VIEWS", "Scene", "end_is_seen", "ends_elsewhere", "goes_on_unseen", "may_reach", "shown_end",
+]  # fmt: skip
 
 AS_CLEAR = 0.8  # of the score of the edge at the plane
 LEAST_VIEWS = 3  # photographs that must show an edge for it to decide anything
+MOST_ENDS = 0.5  # of a board's end that may have a third board right behind it: more, and it ends there
 MOST_SPOILT = 0.3  # of a gap may be seen through, or taken by another board
 
 
@@ -71,6 +74,29 @@ def end_is_seen(scene: Scene, joint: Joint) -> bool:
     return float((distance < scene.mm(scene.options.end_offset) * 2).mean()) > 0.5
 
 
+def ends_elsewhere(scene: Scene, joint: Joint) -> bool:
+    """Whether b ends on a third board, which tells nothing of a: as a rail that ends on a leg does, beside another
+    rail that ends on the leg's face.
+    """
+    board, slack = scene.sheets[joint.b], scene.mm(scene.options.outline_error)
+    others = [sheet for k, sheet in enumerate(scene.sheets) if k not in (joint.a, joint.b)]
+    inside, along = joint.trace.coordinates(joint.ends)
+    for step in (slack / 2, slack):
+        beyond = joint.trace.place(inside - step, along)
+        places = board.to_world(np.c_[beyond, np.full(len(beyond), board.thickness.value / 2)])
+        if any(_in_wood(places, sheet).mean() > MOST_ENDS for sheet in others):
+            return True
+    return False
+
+
+def _in_wood(places: np.ndarray, sheet: Sheet) -> np.ndarray:
+    """(N,) which places (N, 3) lie in a board."""
+    x = sheet.to_board(places)
+    inside = (x[:, 2] > 0) & (x[:, 2] < sheet.thickness.value)
+    inside[inside] = shapely.contains_xy(sheet.region, x[inside, 0], x[inside, 1])
+    return inside
+
+
 def goes_on_unseen(scene: Scene, joint: Joint | None) -> Joint | None:
     """A far joint whose board just fades out: no cut face ends it, nobody saw through the gap, and the photographs show
     an edge at the plane, or nothing.
@@ -108,9 +134,7 @@ def _gap_is_taken(scene: Scene, joint: Joint) -> bool:
     places = _gap_places(scene, joint, (np.arange(steps) + 0.5) / steps)
     taken = np.zeros(len(places), bool)
     for sheet in others:
-        x = sheet.to_board(places)
-        inside = (x[:, 2] > 0) & (x[:, 2] < sheet.thickness.value)
-        taken[inside] |= shapely.contains_xy(sheet.region, x[inside, 0], x[inside, 1])
+        taken |= _in_wood(places, sheet)
     taken = taken.reshape(steps, -1)  # from the plane to the outline
     crossed = (taken[1:] & np.logical_or.accumulate(~taken[:-1])).any(axis=0)
     return max(float(taken.mean()), float(crossed.mean())) > MOST_SPOILT
