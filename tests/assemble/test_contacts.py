@@ -149,3 +149,15 @@ def test_a_leg_that_has_a_notch_already_ends_there(monkeypatch):
     monkeypatch.setattr(contacts, "look_for_seam", lambda _, joint, *__: Seam(9.0 if joint.a == 1 else 1.4, 9))
     (found,) = decided_without_photos(leg, rail)
     assert to_contact(found, (leg, rail)).a == "rail"
+
+
+@pytest.mark.parametrize(("seen", "held"), [(True, 1), (False, 0)])
+def test_a_rail_that_ends_on_a_leg_does_not_end_on_a_face_nobody_saw(seen, held):
+    """Two rails at a leg: one ends on the leg's face, the other on its edge, near where the first's hidden face may be.
+    """
+    leg = sheet("leg", pose((0, 0, 0), (0, 1, 0), (0, 0, 1)), 8.0, (0, 0, 50, 218))
+    front = sheet("front", pose((8, 45, 168), (1, 0, 0), (0, 0, 1)), 25.0, (0, 0, 140, 50), thickness_seen=seen)
+    side = sheet("side", pose((1, 0, 0), (0, 1, 0), (0, 0, 1)), 6.0, (50, 168, 100, 218))
+    pairs = [{d.joint.a, d.joint.b} for d in decided_without_photos(leg, front, side)]
+    assert pairs.count({0, 1}) == 1
+    assert pairs.count({1, 2}) == held
