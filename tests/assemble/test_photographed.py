@@ -68,7 +68,7 @@ def test_without_boards_on_it_a_hidden_face_stays_inferred():
 def test_a_board_that_ends_on_a_third_one_says_nothing_of_a_hidden_face(monkeypatch):
     monkeypatch.setattr(backs, "sweep_line", edge_at(18.0, 0.7))
     boards, capture = hidden_top(), shelf_capture()
-    beam = replace(moved(top_first()[0], -20.0), name="beam")
+    beam = replace(moved(top_first()[0], -8.0), name="beam")
     assert not measured_backs((*boards, beam), capture.cloud, Photos(capture), BLIND, OPTIONS)[0].thickness_seen
 
 

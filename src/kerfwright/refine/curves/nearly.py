@@ -39,28 +39,34 @@ def with_straight_edges(
     k = 0
     while k < fit.shape.count:
         trial = _straight_from(fit.shape, k, samples, guides, options)
-        (fit, samples), k = ((fit, samples), k + 1) if trial is None else (trial, k)
+        is_settled = trial is None or trial[0].shape.count == fit.shape.count
+        fit, samples = trial or (fit, samples)
+        k += is_settled
     return fit, samples
 
 
 def _straight_from(
     shape: Shape, first: int, samples: Samples, guides: list[GuideLine], options: CurveOptions
 ) -> tuple[Fit, Samples] | None:
-    """The fit with the stretch that begins at a sharp node as one line; None where it is one already, or no line."""
+    """The fit with the stretch that begins at a sharp node as one line; None where it is no line, or one already that
+    does not lie between two levels.
+    """
     if not _is_sharp(shape, first, options):
         return None
     count = next((c for c in range(1, MOST_EDGES + 1) if _is_sharp(shape, first + c, options)), 0)
     edges = [(first + i) % shape.count for i in range(count)]
-    if not edges or (count == 1 and shape.kinds[first] == LINE) or shape.count - count + 1 < LEAST_EDGES:
+    if not edges or shape.count - count + 1 < LEAST_EDGES:
         return None
     if any(shape.lines[k] >= 0 for k in edges):
         return None
     stretch = _stretch(shape, edges, samples)
     if not _is_nearly_straight(stretch, samples, options):
         return None
-    samples = _on_outer_level(stretch, samples)
-    trial = solve(joined(shape, first, count, samples.count), samples, guides)
-    return (trial, samples) if is_sound(trial.shape, samples) else None
+    told, is_line = _on_outer_level(stretch, samples), count == 1 and shape.kinds[first] == LINE
+    if is_line and told is samples:
+        return None
+    trial = solve(shape if is_line else joined(shape, first, count, samples.count), told, guides)
+    return (trial, told) if is_sound(trial.shape, told) else None
 
 
 def _stretch(shape: Shape, edges: list[int], samples: Samples) -> np.ndarray:
