@@ -28,6 +28,8 @@ __all__ = ["report_html"]
 
 Colour = tuple[float, float, float]
 
+NO_GAP = 1e-6  # of the objective; what is left of it is rounding
+
 _SCALES = {
     "assumed": "assumed: measure a board before you cut", "given": "given", "file": "of the cloud's format",
     "measured": "measured", "inferred": "guessed from the boards",
@@ -107,7 +109,9 @@ def _chosen(choice: Choice | None) -> str:
     """How the boards were chosen, for those who want to know how sure that is."""
     if choice is None:
         return ""
-    proven = "not proven best" if choice.gap is None else f"no choice is better by more than {choice.gap:.2g}"
+    proven = "not proven best"
+    if choice.gap is not None:
+        proven = "proven best" if choice.gap < NO_GAP else f"no choice is better by more than {choice.gap:.2g}"
     return (
         f" {choice.chosen} of {choice.candidates} candidates chosen, which explain {100 * choice.explained:.0f} % of "
         f"the cloud; objective {choice.objective:.4f} ({choice.method}), {proven}."
