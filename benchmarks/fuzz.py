@@ -127,7 +127,7 @@ def _parts() -> object:
     idx = np.arange(8)[::2]
     hole = Polygon([(0, 0), (9, 0), (9, 9)], [[(5, 1), (6, 2), (6, 1)]])
     sheet = Sheet("s", np.eye(4), Quantity(value=18), True, hole, idx, idx, idx)
-    plane = Primitive("plane", np.eye(3)[0], 1.0, idx, np.zeros(3), 0.1)
+    plane = Primitive(np.eye(3)[0], 1.0, idx, np.zeros(3), 0.1)
     return Parts((sheet,), (plane,), 0.1, notes=("a note",), selection={"gap": np.float64(0), "at": Path("a/b.jpg")})
 
 

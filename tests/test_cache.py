@@ -133,7 +133,7 @@ def test_results_of_stages_come_back_as_they_were(tmp_path):
     hole = Polygon([(0, 0), (9, 0), (9, 9)], [[(5, 1), (6, 2), (6, 1)]])
     idx = np.arange(2)
     sheet = Sheet("s", np.eye(4), Quantity(value=18), True, hole, idx, idx, idx)
-    plane = Primitive("plane", np.eye(3)[0], 1.0, idx, np.zeros(3), 0.1)
+    plane = Primitive(np.eye(3)[0], 1.0, idx, np.zeros(3), 0.1)
     parts = Parts((sheet,), (plane,), 0.1, notes=("a note",), selection={"gap": np.float64(0)})
     stages = {"capture": Counter(capture), "identify": Counter(parts)}
     run(tmp_path, stages)

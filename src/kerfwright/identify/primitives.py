@@ -97,4 +97,4 @@ def find_planes(cloud: Cloud, around: Neighbourhood, options: IdentifyOptions) -
 
 def _primitive(cloud: Cloud, around: Neighbourhood, idx: np.ndarray) -> Primitive:
     normal, offset, centre, sigma = plane_fit(cloud.points[idx], around.normals[idx].mean(axis=0))
-    return Primitive("plane", normal, offset, idx, centre, sigma)
+    return Primitive(normal, offset, idx, centre, sigma)

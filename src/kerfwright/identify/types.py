@@ -16,15 +16,13 @@ INFERRED_FACES = {"top": (0.0, 0.0, 1.0), "bottom": (0.0, 0.0, -1.0)}
 
 @dataclass(frozen=True, eq=False)
 class Primitive:
-    """A patch of the cloud on a plane n.x = offset (n outward, world) or on a cylinder."""
+    """A patch of the cloud on a plane n.x = offset (n outward, world)."""
 
-    kind: str  # "plane" or "cylinder"
-    normal: np.ndarray  # (3,) outward unit normal of a plane; axis of a cylinder
+    normal: np.ndarray  # (3,) outward unit normal
     offset: float  # mm along the normal
     point_idx: np.ndarray  # indices into the cloud
     centroid: np.ndarray  # (3,)
     sigma: float  # robust noise of its points across it, mm
-    radius: float | None = None  # of a cylinder
 
 
 @dataclass(frozen=True, eq=False)
