@@ -19,57 +19,65 @@ __all__ = ["export"]
 
 _DRAWN, _CUT, _LAID = "Drawings: dxf, svg, sheets, cutlist", "Cutting: dxf, svg, sheets", "Laying out: sheets"
 
+Force = Annotated[
+    bool, typer.Option("--force", help="Export even what the checker forbids; the files say NOT VERIFIED.")
+]
+Units = Annotated[str, typer.Option("--units", metavar="UNIT", rich_help_panel=_DRAWN, help="mm or in.")]
+Layers = Annotated[
+    str, typer.Option("--layers", metavar="PRESET", rich_help_panel=_DRAWN, help="Layer names: plain, depth, numbered.")
+]
+Splines = Annotated[bool, typer.Option("--splines", rich_help_panel=_DRAWN, help="Beziers as splines, not as arcs.")]
+Tolerance = Annotated[
+    str, typer.Option("--tolerance", metavar="LENGTH", rich_help_panel=_DRAWN, help="How far arcs stray from Beziers.")
+]
+Mesh = Annotated[
+    str, typer.Option("--mesh", metavar="LENGTH", rich_help_panel=_DRAWN, help="How far triangles stray, in gltf.")
+]
+Kerf = Annotated[
+    str,
+    typer.Option(
+        "--kerf", metavar="LENGTH", rich_help_panel=_CUT, help="Width of the cut; draws the tool's path as well."
+    ),
+]
+Relief = Annotated[
+    str, typer.Option("--relief", metavar="KIND", rich_help_panel=_CUT, help="Inside corners: none, dogbone, tbone.")
+]
+Margin = Annotated[
+    str, typer.Option("--margin", metavar="LENGTH", rich_help_panel=_LAID, help="Border of a sheet left unused.")
+]
+Spacing = Annotated[
+    str, typer.Option("--spacing", metavar="LENGTH", rich_help_panel=_LAID, help="Between boards; the kerf, if wider.")
+]
+Grain = Annotated[
+    bool, typer.Option("--grain", rich_help_panel=_LAID, help="Keep boards' x axes along the sheets' grain.")
+]
+Formats = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="FORMAT...", help="step, step214, script, cadquery, gltf, brep, dxf, svg, sheets, cutlist; or all."
+    ),
+]
+Out = Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for the files; made if need be.")]
+ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="A model.json, or a folder that has one.")]
+
 
 def export(
-    model: Annotated[Path, typer.Argument(metavar="MODEL", help="A model.json, or a folder that has one.")],
-    formats: Annotated[
-        list[str],
-        typer.Argument(
-            metavar="FORMAT...", help="step, step214, script, cadquery, gltf, brep, dxf, svg, sheets, cutlist; or all."
-        ),
-    ],
-    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Folder for the files; made if need be.")],
-    force: Annotated[
-        bool, typer.Option("--force", help="Export even what the checker forbids; the files say NOT VERIFIED.")
-    ] = False,
-    units: Annotated[str, typer.Option("--units", metavar="UNIT", rich_help_panel=_DRAWN, help="mm or in.")] = "mm",
-    layers: Annotated[
-        str,
-        typer.Option("--layers", metavar="PRESET", rich_help_panel=_DRAWN, help="Layer names: plain, depth, numbered."),
-    ] = "plain",
-    splines: Annotated[
-        bool, typer.Option("--splines", rich_help_panel=_DRAWN, help="Beziers as splines, not as arcs.")
-    ] = False,
-    tolerance: Annotated[
-        str,
-        typer.Option("--tolerance", metavar="LENGTH", rich_help_panel=_DRAWN, help="How far arcs stray from Beziers."),
-    ] = "0.05",
-    mesh: Annotated[
-        str,
-        typer.Option("--mesh", metavar="LENGTH", rich_help_panel=_DRAWN, help="How far triangles stray, in gltf."),
-    ] = "0.1",
+    model: ModelFile,
+    formats: Formats,
+    out: Out,
+    force: Force = False,
+    units: Units = "mm",
+    layers: Layers = "plain",
+    splines: Splines = False,
+    tolerance: Tolerance = "0.05",
+    mesh: Mesh = "0.1",
     tool: Tool = "6",
-    kerf: Annotated[
-        str,
-        typer.Option(
-            "--kerf", metavar="LENGTH", rich_help_panel=_CUT, help="Width of the cut; draws the tool's path as well."
-        ),
-    ] = "0",
-    relief: Annotated[
-        str,
-        typer.Option("--relief", metavar="KIND", rich_help_panel=_CUT, help="Inside corners: none, dogbone, tbone."),
-    ] = "none",
+    kerf: Kerf = "0",
+    relief: Relief = "none",
     sheet: Sheet = SHEET,
-    margin: Annotated[
-        str, typer.Option("--margin", metavar="LENGTH", rich_help_panel=_LAID, help="Border of a sheet left unused.")
-    ] = "10",
-    spacing: Annotated[
-        str,
-        typer.Option("--spacing", metavar="LENGTH", rich_help_panel=_LAID, help="Between boards; the kerf, if wider."),
-    ] = "6",
-    grain: Annotated[
-        bool, typer.Option("--grain", rich_help_panel=_LAID, help="Keep boards' x axes along the sheets' grain.")
-    ] = False,
+    margin: Margin = "10",
+    spacing: Spacing = "6",
+    grain: Grain = False,
 ) -> None:
     """Write MODEL as STEP, DXF, a build123d script, cut sheets and more.
 
